@@ -1,0 +1,2 @@
+//! Board support.
+#![no_std]
