@@ -1,1 +1,5 @@
 //! Simulator.
+
+pub mod bus;
+pub mod frame;
+pub mod time;
