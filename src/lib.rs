@@ -24,6 +24,8 @@ extern crate std;
 
 pub mod frame;
 pub mod id;
+pub mod od;
+pub mod sdo;
 pub mod time;
 
 pub use frame::Frame;

@@ -1,0 +1,6 @@
+//! Tests of the SDO services.
+
+mod client;
+mod commands;
+mod common;
+mod server;
