@@ -2,4 +2,6 @@
 
 pub mod bus;
 pub mod frame;
+pub mod judge;
+pub mod log;
 pub mod time;

@@ -1,0 +1,201 @@
+//! Who arrived where: movements in the plant against the program's targets.
+
+use canmaster::NodeId;
+
+use super::axis::AxisMonitor;
+use crate::time::Time;
+
+/// What one move asks of one axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Part {
+    /// Increments from the axis' home: where it stood when it was enabled.
+    pub target: i32,
+    /// Axes of one set start and stop together.
+    pub set: u8,
+}
+
+/// What the firmware's program asks of the axes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Assignment {
+    /// The parts of each move by axis. All moves, one after the other, make a
+    /// round trip.
+    pub moves: Vec<Vec<Part>>,
+    /// SYNC period: axes of one set have to stop within it.
+    pub cycle: Time,
+}
+
+/// A release: what the operator gave with the button.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Release {
+    /// When the button was pressed.
+    pub at: Time,
+    /// Where each axis stood when it was enabled, increments.
+    pub homes: Vec<i32>,
+    /// When every axis had come to rest after its last move.
+    pub done: Option<Time>,
+    /// It was taken back before that: the stop button, a reset, a fault.
+    pub revoked: bool,
+}
+
+/// One axis at the end of one move.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Arrival {
+    /// The drive.
+    pub node: NodeId,
+    /// Place of the axis in the network.
+    pub axis: usize,
+    /// Which release it belongs to, from 1.
+    pub release: usize,
+    /// Which move of the program, from 0.
+    pub step: usize,
+    /// Axes of one set start and stop together.
+    pub set: u8,
+    /// Where it should be, increments.
+    pub target: i32,
+    /// Greatest distance of the true position from there while at rest.
+    pub error: i64,
+    /// Last moment above 5 rpm.
+    pub stopped: Time,
+}
+
+/// All arrivals in the order of their releases, moves and axes.
+pub fn arrivals(
+    nodes: &[NodeId],
+    axes: &[AxisMonitor],
+    assignment: &Assignment,
+    releases: &[Release],
+) -> Vec<Arrival> {
+    let mut all = Vec::new();
+    for (number, release) in (1..).zip(releases) {
+        if release.revoked {
+            continue;
+        }
+        for (axis, (monitor, &node)) in axes.iter().zip(nodes).enumerate() {
+            let movements = monitor
+                .movements()
+                .iter()
+                .filter(|movement| movement.release == number);
+            for (step, (movement, parts)) in movements.zip(&assignment.moves).enumerate() {
+                let (Some(part), Some(&home)) = (parts.get(axis), release.homes.get(axis)) else {
+                    continue;
+                };
+                let target = home.wrapping_add(part.target);
+                if movement.settled {
+                    all.push(Arrival {
+                        node,
+                        axis,
+                        release: number,
+                        step,
+                        set: part.set,
+                        target,
+                        error: movement.error(target),
+                        stopped: movement.stopped,
+                    });
+                }
+            }
+        }
+    }
+    all.sort_by_key(|arrival| (arrival.release, arrival.step, arrival.axis));
+    all
+}
+
+/// The greatest distance in time between the stops of axes that belong
+/// together in one move, and the two drives.
+pub fn worst_pair(arrivals: &[Arrival]) -> Option<(Time, NodeId, NodeId)> {
+    let mut worst: Option<(Time, NodeId, NodeId)> = None;
+    for (n, a) in arrivals.iter().enumerate() {
+        for b in &arrivals[n + 1..] {
+            if (a.release, a.step, a.set) != (b.release, b.step, b.set) {
+                continue;
+            }
+            let apart = a.stopped.since(b.stopped).max(b.stopped.since(a.stopped));
+            if worst.is_none_or(|(most, ..)| apart > most) {
+                worst = Some((apart, a.node, b.node));
+            }
+        }
+    }
+    worst
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::judge::axis::TracePoint;
+
+    /// Turns from `from` to `to` under `release`, in 300 ms, and rests.
+    fn drive(axis: &mut AxisMonitor, start_ms: u64, from: f64, to: f64, release: usize) {
+        for ms in 0..1000 {
+            let share = (ms as f64 / 300.0).min(1.0);
+            axis.sample(
+                TracePoint {
+                    at: Time::from_ms(start_ms + ms),
+                    position: from + (to - from) * share,
+                    velocity: if ms < 300 { 1000.0 } else { 0.0 },
+                },
+                Some(release),
+            );
+        }
+    }
+
+    fn assignment() -> Assignment {
+        let both = |target| vec![Part { target, set: 1 }; 2];
+        Assignment {
+            moves: vec![both(20_000), both(0)],
+            cycle: Time::from_ms(10),
+        }
+    }
+
+    fn done(at_ms: u64) -> Release {
+        let done = Some(Time::from_ms(at_ms + 3000));
+        Release {
+            at: Time::from_ms(at_ms),
+            homes: vec![100, 100],
+            done,
+            revoked: false,
+        }
+    }
+
+    #[test]
+    fn every_move_of_every_release_has_its_target() {
+        let nodes = [NodeId::constant::<1>(), NodeId::constant::<2>()];
+        let mut axes = [AxisMonitor::default(), AxisMonitor::default()];
+        for (axis, late) in axes.iter_mut().zip([0, 4]) {
+            drive(axis, 1000 + late, 100.0, 20_103.0, 1);
+            drive(axis, 2000 + late, 20_103.0, 100.0, 1);
+            drive(axis, 5000 + late, 100.0, 20_100.0, 2);
+        }
+        let all = arrivals(&nodes, &axes, &assignment(), &[done(900), done(4900)]);
+        let summary: Vec<_> = all
+            .iter()
+            .map(|a| (a.release, a.step, a.axis, a.error))
+            .collect();
+        assert_eq!(
+            summary,
+            [
+                (1, 0, 0, 3),
+                (1, 0, 1, 3),
+                (1, 1, 0, 0),
+                (1, 1, 1, 0),
+                (2, 0, 0, 0),
+                (2, 0, 1, 0)
+            ]
+        );
+        assert_eq!(
+            worst_pair(&all),
+            Some((Time::from_ms(4), nodes[0], nodes[1]))
+        );
+    }
+
+    #[test]
+    fn a_revoked_release_has_no_arrivals() {
+        let nodes = [NodeId::constant::<1>()];
+        let mut axes = [AxisMonitor::default()];
+        drive(&mut axes[0], 1000, 0.0, 9_000.0, 1);
+        let revoked = Release {
+            revoked: true,
+            ..done(900)
+        };
+        assert!(arrivals(&nodes, &axes, &assignment(), &[revoked]).is_empty());
+        assert_eq!(worst_pair(&[]), None);
+    }
+}

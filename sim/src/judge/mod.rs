@@ -1,0 +1,13 @@
+//! The figures of a run, judged on the bus and in the plant; nothing in here
+//! is reported by the firmware about itself.
+
+pub mod arrivals;
+pub mod axis;
+pub mod bus;
+pub mod grid;
+pub mod verdict;
+
+pub use arrivals::{Arrival, Assignment, Part, Release, arrivals, worst_pair};
+pub use axis::{AxisMonitor, Movement, STANDSTILL_RPM, TracePoint};
+pub use bus::{BusFigures, Traffic};
+pub use verdict::{ARRIVAL_TOLERANCE, Evidence, Outcome, Verdict, verdict};
