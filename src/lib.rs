@@ -22,8 +22,10 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod design;
 pub mod frame;
 pub mod id;
+pub mod master;
 pub mod od;
 pub mod sdo;
 pub mod time;

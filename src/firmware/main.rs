@@ -1,5 +1,20 @@
-//! The firmware image. On the host there is nothing to run.
+//! The firmware image: an RTIC 2 application that wires the library `canmaster`
+//! to the NUCLEO-G474RE. On the host there is nothing to run.
 #![cfg_attr(target_os = "none", no_std, no_main)]
+
+#[cfg(target_os = "none")]
+mod app;
+#[cfg(target_os = "none")]
+mod counters;
+#[cfg(target_os = "none")]
+mod filters;
+#[cfg(target_os = "none")]
+mod hard_fault;
+#[cfg(target_os = "none")]
+mod roll;
+
+#[cfg(target_os = "none")]
+use {defmt_rtt as _, panic_probe as _};
 
 #[cfg(not(target_os = "none"))]
 fn main() {

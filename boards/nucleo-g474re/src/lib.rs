@@ -1,2 +1,126 @@
-//! Board support.
+//! The NUCLEO-G474RE (STM32G474RE, 24 MHz crystal) as a CAN master uses it.
+//!
+//! [`setup`] consumes the peripherals once and hands back configured devices:
+//! clocks at 170 MHz, FDCAN1 on PA11/PA12, a period timer with a compare, a
+//! millisecond tick, a microsecond clock, two LEDs, the button, the watchdog,
+//! and what caused the last reset.
+//!
+//! The crate knows nothing of any protocol above CAN: frames are
+//! `embedded_can::Frame`. It is the only place with `unsafe` code; each block
+//! says why it is sound. On the host it compiles to nothing.
 #![no_std]
+#![cfg(target_os = "none")]
+
+pub mod can;
+pub mod clock;
+pub mod pins;
+pub mod reset_cause;
+pub mod timers;
+pub mod watchdog;
+
+mod message_ram;
+
+pub use stm32g4xx_hal::pac;
+
+use stm32g4xx_hal::{gpio::GpioExt, pwr::PwrExt, rcc::RccExt};
+
+/// How fast the core and the timers run.
+pub const CORE_HZ: u32 = 170_000_000;
+
+/// What a user of the board may choose.
+#[derive(Clone, Copy)]
+pub struct Config {
+    /// The period of [`Devices::period`], in microseconds, 1..=65 535.
+    pub period_us: u16,
+    /// When in each period [`Devices::deadline`] comes due, in microseconds
+    /// after its start; less than `period_us`.
+    pub deadline_us: u16,
+    /// After how long without [`watchdog::Watchdog::feed`] the board resets,
+    /// in milliseconds, 1..=500.
+    pub watchdog_ms: u32,
+    /// What the CAN controller receives: at most
+    /// [`can::FILTERS`] ranges, the index of the first that matches comes with
+    /// each frame.
+    pub filters: &'static [can::RangeFilter],
+}
+
+/// The board, ready to be used.
+pub struct Devices {
+    /// Why the board started.
+    pub reset_cause: reset_cause::ResetCause,
+    /// Sends.
+    pub can_tx: can::Tx,
+    /// Receives and tells what the controller has to report.
+    pub can_rx: can::Rx,
+    /// TIM2: its update event starts a period.
+    pub period: timers::Period,
+    /// TIM3: runs with TIM2; its compare event comes at the deadline.
+    pub deadline: timers::Deadline,
+    /// TIM7: every millisecond.
+    pub tick: timers::Tick,
+    /// TIM5: free-running microseconds.
+    pub microseconds: timers::Microseconds,
+    /// LD2, green.
+    pub run_led: pins::RunLed,
+    /// The red LED to be wired to PB0.
+    pub error_led: pins::ErrorLed,
+    /// B1, the blue button.
+    pub button: pins::Button,
+    /// The independent watchdog, already running.
+    pub watchdog: watchdog::Watchdog,
+}
+
+/// Configures the board. The timers run on return; their interrupts come as
+/// soon as the interrupt controller lets them through.
+///
+/// # Panics
+///
+/// If `config` is outside the ranges that its fields state: a mistake of the
+/// firmware's author, found the first time that it runs.
+pub fn setup(peripherals: pac::Peripherals, config: &Config) -> Devices {
+    // First of all, so that whatever hangs below ends in a reset, too.
+    let watchdog = watchdog::start(peripherals.IWDG, &peripherals.DBGMCU, config.watchdog_ms);
+
+    let power = clock::power(peripherals.PWR.constrain());
+    let rcc = peripherals.RCC.constrain();
+    let reset_cause = reset_cause::ResetCause::from(rcc.get_reset_reason());
+    let mut rcc = rcc.freeze(clock::config(), power);
+    rcc.clear_reset_reason();
+
+    let pins = pins::setup(
+        peripherals.GPIOA.split(&mut rcc),
+        peripherals.GPIOB.split(&mut rcc),
+        peripherals.GPIOC.split(&mut rcc),
+    );
+    let (can_tx, can_rx) = can::setup(
+        peripherals.FDCAN1,
+        pins.can_tx,
+        pins.can_rx,
+        &mut rcc,
+        config.filters,
+    );
+    let timers = timers::setup(
+        timers::Peripherals {
+            tim2: peripherals.TIM2,
+            tim3: peripherals.TIM3,
+            tim5: peripherals.TIM5,
+            tim7: peripherals.TIM7,
+        },
+        &mut rcc,
+        config.period_us,
+        config.deadline_us,
+    );
+    Devices {
+        reset_cause,
+        can_tx,
+        can_rx,
+        period: timers.period,
+        deadline: timers.deadline,
+        tick: timers.tick,
+        microseconds: timers.microseconds,
+        run_led: pins.run_led,
+        error_led: pins.error_led,
+        button: pins.button,
+        watchdog,
+    }
+}

@@ -1,0 +1,142 @@
+//! Timers, programmed register by register: the HAL's count-down timer loads one
+//! tick too many and uses 16 bits only.
+
+use crate::CORE_HZ;
+use stm32g4xx_hal::{
+    pac,
+    rcc::{Enable, Rcc, Reset},
+};
+
+const MICROSECONDS_PER_SECOND: u32 = 1_000_000;
+/// Ticks of the core's clock in a microsecond.
+const TICKS_PER_US: u32 = CORE_HZ / MICROSECONDS_PER_SECOND;
+/// The prescaler that makes a timer count microseconds.
+const MICROSECOND_PRESCALER: u16 = (TICKS_PER_US - 1) as u16;
+const TICK_US: u32 = 1000;
+
+/// TIM2: an update event at the start of each period, to the clock tick.
+pub struct Period(pac::TIM2);
+
+impl Period {
+    /// Acknowledges the update event.
+    #[inline(always)]
+    pub fn acknowledge(&mut self) {
+        self.0.sr().write(|w| w.uif().clear());
+    }
+}
+
+/// TIM3: counts the microseconds of the period; a compare event at the deadline.
+pub struct Deadline(pac::TIM3);
+
+impl Deadline {
+    /// Whether the deadline has passed since the last call.
+    pub fn take(&mut self) -> bool {
+        if self.0.sr().read().cc1if().bit_is_clear() {
+            return false;
+        }
+        self.0.sr().write(|w| w.cc1if().clear_bit());
+        true
+    }
+}
+
+/// TIM7: an update event every millisecond.
+pub struct Tick(pac::TIM7);
+
+impl Tick {
+    /// Whether a millisecond has passed since the last call.
+    pub fn take(&mut self) -> bool {
+        if self.0.sr().read().uif().bit_is_clear() {
+            return false;
+        }
+        self.0.sr().write(|w| w.uif().clear_bit());
+        true
+    }
+}
+
+/// TIM5: microseconds since the start, modulo 2^32. May be copied: it only
+/// reads.
+#[derive(Clone, Copy)]
+pub struct Microseconds(());
+
+impl Microseconds {
+    /// Microseconds since the start, modulo 2^32.
+    #[inline(always)]
+    pub fn now(self) -> u32 {
+        // SAFETY: reading the counter has no effect on it and cannot tear: one
+        // aligned 32-bit access. A `Microseconds` exists only after TIM5's
+        // clock was switched on, and nobody else holds the peripheral.
+        unsafe { (*pac::TIM5::ptr()).cnt().read().bits() }
+    }
+}
+
+pub(crate) struct Peripherals {
+    pub(crate) tim2: pac::TIM2,
+    pub(crate) tim3: pac::TIM3,
+    pub(crate) tim5: pac::TIM5,
+    pub(crate) tim7: pac::TIM7,
+}
+
+pub(crate) struct Timers {
+    pub(crate) period: Period,
+    pub(crate) deadline: Deadline,
+    pub(crate) tick: Tick,
+    pub(crate) microseconds: Microseconds,
+}
+
+/// # Panics
+///
+/// If `period_us` is 0 or `deadline_us` does not lie within the period.
+pub(crate) fn setup(p: Peripherals, rcc: &mut Rcc, period_us: u16, deadline_us: u16) -> Timers {
+    assert!(period_us > 0 && deadline_us < period_us);
+    pac::TIM2::enable(rcc);
+    pac::TIM2::reset(rcc);
+    pac::TIM3::enable(rcc);
+    pac::TIM3::reset(rcc);
+    pac::TIM5::enable(rcc);
+    pac::TIM5::reset(rcc);
+    pac::TIM7::enable(rcc);
+    pac::TIM7::reset(rcc);
+
+    // URS everywhere: the forced update that loads the prescaler raises no flag.
+    p.tim2.cr1().write(|w| w.urs().counter_only());
+    p.tim2.psc().write(|w| w.psc().set(0));
+    p.tim2
+        .arr()
+        .write(|w| w.arr().set(u32::from(period_us) * TICKS_PER_US - 1));
+    p.tim2.egr().write(|w| w.ug().update());
+    p.tim2.dier().write(|w| w.uie().enabled());
+
+    p.tim3.cr1().write(|w| w.urs().counter_only());
+    p.tim3.psc().write(|w| w.psc().set(MICROSECOND_PRESCALER));
+    p.tim3
+        .arr()
+        .write(|w| w.arr().set(u32::from(period_us) - 1));
+    p.tim3.ccr1().write(|w| w.ccr().set(deadline_us.into()));
+    p.tim3.egr().write(|w| w.ug().update());
+    p.tim3.dier().write(|w| w.cc1ie().enabled());
+
+    p.tim5.cr1().write(|w| w.urs().counter_only());
+    p.tim5.psc().write(|w| w.psc().set(MICROSECOND_PRESCALER));
+    p.tim5.arr().write(|w| w.arr().set(u32::MAX));
+    p.tim5.egr().write(|w| w.ug().update());
+
+    p.tim7.cr1().write(|w| w.urs().counter_only());
+    p.tim7.psc().write(|w| w.psc().set(MICROSECOND_PRESCALER));
+    p.tim7.arr().write(|w| w.arr().set(TICK_US - 1));
+    p.tim7.egr().write(|w| w.ug().update());
+    p.tim7.dier().write(|w| w.uie().enabled());
+
+    // TIM2 and TIM3 start within a few ticks of each other and run on one
+    // clock, so they stay that close for ever.
+    p.tim5.cr1().modify(|_, w| w.cen().enabled());
+    p.tim7.cr1().modify(|_, w| w.cen().enabled());
+    p.tim2.cr1().modify(|_, w| w.cen().enabled());
+    p.tim3.cr1().modify(|_, w| w.cen().enabled());
+
+    Timers {
+        period: Period(p.tim2),
+        deadline: Deadline(p.tim3),
+        tick: Tick(p.tim7),
+        microseconds: Microseconds(()),
+    }
+}

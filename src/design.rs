@@ -1,0 +1,37 @@
+//! The firmware's constants, each with its reason. What belongs to the network
+//! rather than to the firmware is in [`crate::network`].
+
+/// Axes of the group.
+pub const AXES: usize = 6;
+
+/// When the PDO producer goes ahead without the TPDOs that are missing, in
+/// microseconds after the SYNC. Twelve TPDOs take 1.4 ms on the wire at worst
+/// and drives start sending within a millisecond; what is not here after half a
+/// cycle will not come, and the other half is enough for the RPDOs (0.8 ms) with
+/// plenty left for everything else.
+pub const TPDO_DEADLINE_US: u16 = 5_000;
+
+/// Cycles in a row without a TPDO after which its drive counts as lost: one may
+/// fall to a bus error and one to its retransmission.
+pub const TPDO_MISSING_LIMIT: u8 = 3;
+
+/// The watchdog's time in milliseconds. Ten cycles: far longer than anything a
+/// healthy firmware does, and short against the time in which the drives miss
+/// the master's heartbeat, so that a hung master is silent soon.
+pub const WATCHDOG_MS: u32 = 100;
+
+/// Samples of a millisecond that the button's contact has to keep still.
+/// Contacts of this kind bounce for up to 5 ms.
+pub const BUTTON_SAMPLES: u8 = 20;
+
+/// Frames that may wait for a transmit buffer. At worst seven RPDOs of a cycle,
+/// an SDO request or an abort for each of six nodes, an NMT command for each, and
+/// a heartbeat: 20. What is over is reserve.
+pub const TX_QUEUE: usize = 32;
+
+/// Frames that may wait for a task, plus one that the ring leaves empty. The
+/// tasks are woken by the first; this is a burst from every node at once.
+pub const RX_QUEUE: usize = 32;
+
+/// Reports that may wait for the log.
+pub const LOG_QUEUE: usize = 32;

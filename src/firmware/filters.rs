@@ -1,0 +1,47 @@
+//! Which frames are received, and what each is: the index of the filter that
+//! matched selects the handler.
+
+use canmaster::id::FunctionCode;
+use nucleo_g474re::can::{Fifo, RangeFilter};
+
+/// What a received frame is.
+#[derive(Clone, Copy)]
+pub(crate) enum Handler {
+    /// A TPDO: 0 for TPDO1, 1 for TPDO2.
+    Tpdo(usize),
+    Emcy,
+    SdoResponse,
+    /// Boot-up and heartbeat.
+    ErrorControl,
+}
+
+const NODE_MAX: u16 = 127;
+
+/// The identifiers of all 127 nodes: one filter per function code serves any
+/// number of drives.
+const fn nodes(function: FunctionCode, fifo: Fifo) -> RangeFilter {
+    RangeFilter {
+        first: function.base() + 1,
+        last: function.base() + NODE_MAX,
+        fifo,
+    }
+}
+
+/// The filters. Process data and the rest come through different FIFOs, so that
+/// a burst of one does not push out the other.
+pub(crate) static FILTERS: [RangeFilter; 5] = [
+    nodes(FunctionCode::Tpdo1, Fifo::Fifo0),
+    nodes(FunctionCode::Tpdo2, Fifo::Fifo0),
+    nodes(FunctionCode::Emcy, Fifo::Fifo1),
+    nodes(FunctionCode::SdoResponse, Fifo::Fifo1),
+    nodes(FunctionCode::ErrorControl, Fifo::Fifo1),
+];
+
+/// The handler of each filter.
+pub(crate) static HANDLERS: [Handler; FILTERS.len()] = [
+    Handler::Tpdo(0),
+    Handler::Tpdo(1),
+    Handler::Emcy,
+    Handler::SdoResponse,
+    Handler::ErrorControl,
+];

@@ -1,0 +1,334 @@
+//! The cyclic part of the master's object dictionary: what the interrupt tasks
+//! share. Each access touches one entry and is done in a few cycles, for it
+//! holds off the SYNC.
+
+use crate::frame::MAX_DATA;
+
+/// How many TPDOs of each axis the master takes in.
+pub const TPDOS_PER_AXIS: usize = 2;
+/// The bits of a set of TPDOs.
+const SLOTS_MAX: usize = u32::BITS as usize;
+
+/// Which TPDO of which axis: its place in the process image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct TpdoSlot(u8);
+
+impl TpdoSlot {
+    /// The TPDO `number` (0 = TPDO1) of the axis `axis`. `None` if the master
+    /// takes in no such TPDO.
+    pub const fn new(axis: usize, number: usize) -> Option<TpdoSlot> {
+        if number < TPDOS_PER_AXIS && axis < SLOTS_MAX / TPDOS_PER_AXIS {
+            Some(TpdoSlot((axis * TPDOS_PER_AXIS + number) as u8))
+        } else {
+            None
+        }
+    }
+
+    /// The axis.
+    pub const fn axis(self) -> usize {
+        self.0 as usize / TPDOS_PER_AXIS
+    }
+
+    /// 0 for TPDO1, 1 for TPDO2.
+    pub const fn number(self) -> usize {
+        self.0 as usize % TPDOS_PER_AXIS
+    }
+
+    const fn bit(self) -> u32 {
+        1 << self.0
+    }
+}
+
+/// A set of TPDOs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct TpdoSlots(u32);
+
+impl TpdoSlots {
+    /// No TPDO.
+    pub const NONE: TpdoSlots = TpdoSlots(0);
+
+    /// Every TPDO of the first `axes` axes.
+    pub const fn all_of(axes: usize) -> TpdoSlots {
+        let bits = axes * TPDOS_PER_AXIS;
+        TpdoSlots(if bits >= SLOTS_MAX {
+            u32::MAX
+        } else {
+            (1 << bits) - 1
+        })
+    }
+
+    /// Whether it holds `slot`.
+    pub const fn contains(self, slot: TpdoSlot) -> bool {
+        self.0 & slot.bit() != 0
+    }
+
+    /// Whether it holds none.
+    pub const fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// Its members.
+    pub fn iter(self) -> impl Iterator<Item = TpdoSlot> {
+        (0..SLOTS_MAX as u8)
+            .map(TpdoSlot)
+            .filter(move |slot| self.contains(*slot))
+    }
+}
+
+/// What a received TPDO means for the cycle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reception {
+    /// Others are still awaited, or this one came again or unexpected.
+    Stored,
+    /// It was the last that this SYNC had to bring.
+    Last,
+    /// Its length is not that of the mapping: not stored.
+    WrongLength,
+}
+
+/// One cycle, as the PDO producer takes it up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Cycle {
+    /// The number of its SYNC, counted from 1.
+    pub sync: u32,
+    /// The expected TPDOs that did not come in time.
+    pub missing: TpdoSlots,
+}
+
+/// The cyclic part of the object dictionary of a master of `AXES` axes.
+#[derive(Debug)]
+pub struct MasterOd<const AXES: usize> {
+    /// 1005h, bit 30.
+    sync_producer: bool,
+    sync_count: u32,
+    expected: TpdoSlots,
+    received: TpdoSlots,
+    /// The cycle of the last SYNC has not been taken up yet.
+    open: bool,
+    overruns: u32,
+    /// The mapped bytes of each TPDO.
+    lengths: &'static [[u8; TPDOS_PER_AXIS]; AXES],
+    /// What last came.
+    tpdos: [[[u8; MAX_DATA]; TPDOS_PER_AXIS]; AXES],
+}
+
+impl<const AXES: usize> MasterOd<AXES> {
+    /// SYNC off, nothing expected. `lengths` are the mapped bytes of each TPDO
+    /// of each axis.
+    pub const fn new(lengths: &'static [[u8; TPDOS_PER_AXIS]; AXES]) -> MasterOd<AXES> {
+        MasterOd {
+            sync_producer: false,
+            sync_count: 0,
+            expected: TpdoSlots::NONE,
+            received: TpdoSlots::NONE,
+            open: false,
+            overruns: 0,
+            lengths,
+            tpdos: [[[0; MAX_DATA]; TPDOS_PER_AXIS]; AXES],
+        }
+    }
+
+    /// Switches the SYNC producer (1005h, bit 30; CiA 301, 7.5.2.5).
+    pub fn set_sync_producer(&mut self, on: bool) {
+        self.sync_producer = on;
+    }
+
+    /// Whether the SYNC producer is on.
+    pub fn sync_producer(&self) -> bool {
+        self.sync_producer
+    }
+
+    /// SYNCs sent since the start.
+    pub fn sync_count(&self) -> u32 {
+        self.sync_count
+    }
+
+    /// Cycles that were not taken up before the next SYNC.
+    pub fn overruns(&self) -> u32 {
+        self.overruns
+    }
+
+    /// The TPDOs that each SYNC has to bring from now on.
+    pub fn expect(&mut self, slots: TpdoSlots) {
+        self.expected = slots;
+    }
+
+    /// A SYNC was requested: the next cycle begins.
+    #[inline]
+    pub fn open_cycle(&mut self) {
+        self.overruns += u32::from(self.open);
+        self.sync_count = self.sync_count.wrapping_add(1);
+        self.received = TpdoSlots::NONE;
+        self.open = true;
+    }
+
+    /// A TPDO came.
+    #[inline]
+    pub fn store(&mut self, slot: TpdoSlot, data: [u8; MAX_DATA], length: usize) -> Reception {
+        let mapped = self
+            .lengths
+            .get(slot.axis())
+            .and_then(|axis| axis.get(slot.number()));
+        let stored = self
+            .tpdos
+            .get_mut(slot.axis())
+            .and_then(|axis| axis.get_mut(slot.number()));
+        let (Some(mapped), Some(stored)) = (mapped, stored) else {
+            return Reception::Stored;
+        };
+        if length != usize::from(*mapped) {
+            return Reception::WrongLength;
+        }
+        *stored = data;
+        if self.received.contains(slot) {
+            return Reception::Stored;
+        }
+        self.received = TpdoSlots(self.received.0 | slot.bit());
+        if self.expected.contains(slot) && self.missing().is_empty() && self.open {
+            Reception::Last
+        } else {
+            Reception::Stored
+        }
+    }
+
+    fn missing(&self) -> TpdoSlots {
+        TpdoSlots(self.expected.0 & !self.received.0)
+    }
+
+    /// Takes up the cycle: once per SYNC, as soon as every expected TPDO is in,
+    /// or at the deadline with what there is. While none is expected, the
+    /// deadline alone decides.
+    #[inline]
+    pub fn take_cycle(&mut self, deadline: bool) -> Option<Cycle> {
+        let missing = self.missing();
+        let complete = missing.is_empty() && !self.expected.is_empty();
+        if !self.open || !(complete || deadline) {
+            return None;
+        }
+        self.open = false;
+        Some(Cycle {
+            sync: self.sync_count,
+            missing,
+        })
+    }
+
+    /// The data of a TPDO as it last came; zeros before.
+    #[inline]
+    pub fn tpdo(&self, slot: TpdoSlot) -> [u8; MAX_DATA] {
+        self.tpdos
+            .get(slot.axis())
+            .and_then(|axis| axis.get(slot.number()))
+            .copied()
+            .unwrap_or_default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    static LENGTHS: [[u8; 2]; 2] = [[6, 6]; 2];
+
+    fn slot(axis: usize, number: usize) -> TpdoSlot {
+        TpdoSlot::new(axis, number).unwrap()
+    }
+
+    fn running() -> MasterOd<2> {
+        let mut od = MasterOd::new(&LENGTHS);
+        od.set_sync_producer(true);
+        od.expect(TpdoSlots::all_of(2));
+        od
+    }
+
+    #[test]
+    fn slots_are_numbered_without_gaps() {
+        let mut all = 0;
+        for axis in 0..20 {
+            for number in 0..3 {
+                let made = TpdoSlot::new(axis, number);
+                assert_eq!(made.is_some(), axis < 16 && number < 2);
+                let Some(made) = made else { continue };
+                assert_eq!((made.axis(), made.number()), (axis, number));
+                all |= made.bit();
+            }
+        }
+        assert_eq!(TpdoSlots(all), TpdoSlots::all_of(16));
+        assert_eq!(TpdoSlots::all_of(6).iter().count(), 12);
+    }
+
+    #[test]
+    fn no_cycle_without_a_sync() {
+        let mut od = MasterOd::<2>::new(&LENGTHS);
+        assert!(!od.sync_producer());
+        assert_eq!(od.take_cycle(true), None);
+        od.set_sync_producer(true);
+        assert!(od.sync_producer());
+        od.open_cycle();
+        assert_eq!(od.sync_count(), 1);
+    }
+
+    #[test]
+    fn the_last_expected_tpdo_releases_the_cycle_once() {
+        let mut od = running();
+        od.open_cycle();
+        assert_eq!(od.store(slot(0, 0), [1; 8], 6), Reception::Stored);
+        assert_eq!(od.store(slot(0, 0), [2; 8], 6), Reception::Stored);
+        assert_eq!(od.store(slot(1, 0), [3; 8], 6), Reception::Stored);
+        assert_eq!(od.store(slot(0, 1), [4; 8], 6), Reception::Stored);
+        assert_eq!(od.take_cycle(false), None);
+        assert_eq!(od.store(slot(1, 1), [5; 8], 6), Reception::Last);
+        assert_eq!(od.store(slot(1, 1), [5; 8], 6), Reception::Stored);
+        let cycle = od.take_cycle(false).unwrap();
+        assert!(cycle.missing.is_empty());
+        assert_eq!(od.take_cycle(true), None);
+        assert_eq!(od.tpdo(slot(0, 0)), [2; 8]);
+    }
+
+    #[test]
+    fn the_deadline_takes_what_there_is_and_names_the_rest() {
+        let mut od = running();
+        od.open_cycle();
+        od.store(slot(1, 0), [3; 8], 6);
+        let cycle = od.take_cycle(true).unwrap();
+        let missing: std::vec::Vec<_> = cycle.missing.iter().collect();
+        assert_eq!(missing, [slot(0, 0), slot(0, 1), slot(1, 1)]);
+        // What comes after the deadline opens nothing.
+        od.store(slot(0, 0), [3; 8], 6);
+        od.store(slot(0, 1), [3; 8], 6);
+        assert_eq!(od.store(slot(1, 1), [3; 8], 6), Reception::Stored);
+        assert_eq!(od.take_cycle(true), None);
+    }
+
+    #[test]
+    fn without_expectation_the_deadline_alone_decides() {
+        let mut od = running();
+        od.expect(TpdoSlots::NONE);
+        od.open_cycle();
+        assert_eq!(od.take_cycle(false), None);
+        assert!(od.take_cycle(true).is_some());
+    }
+
+    #[test]
+    fn a_wrong_length_is_not_stored() {
+        let mut od = running();
+        od.open_cycle();
+        for length in [0, 5, 7, 8] {
+            let got = od.store(slot(0, 0), [9; 8], length);
+            assert_eq!(got, Reception::WrongLength);
+        }
+        assert_eq!(od.tpdo(slot(0, 0)), [0; 8]);
+    }
+
+    #[test]
+    fn a_cycle_nobody_takes_is_an_overrun() {
+        let mut od = running();
+        od.open_cycle();
+        od.open_cycle();
+        assert_eq!(od.overruns(), 1);
+        od.take_cycle(true);
+        od.open_cycle();
+        assert_eq!(od.overruns(), 1);
+    }
+}

@@ -1,0 +1,204 @@
+//! The frames that wait for one of the controller's transmit buffers.
+
+use crate::{frame::Frame, id::CobId};
+use heapless::Vec;
+
+/// The buffers that frames other than SYNC may occupy. A third stays free, so
+/// that a SYNC never waits for more than the frame on the wire.
+const SHARED_BUFFERS: usize = 2;
+
+/// The queue is full: the frame was not taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Overflow {
+    /// The identifier of the frame that was lost.
+    pub id: CobId,
+}
+
+/// What became of a frame given to [`TxQueue::put_latest`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Put {
+    /// It waits its turn.
+    Queued,
+    /// It took the place of an older one that had not been sent.
+    Replaced,
+}
+
+/// A queue of up to `N` frames, most urgent identifier first, first in first out
+/// among equal identifiers.
+#[derive(Debug, Default)]
+pub struct TxQueue<const N: usize> {
+    /// The most urgent frame last.
+    frames: Vec<Frame, N>,
+    overflows: u32,
+}
+
+impl<const N: usize> TxQueue<N> {
+    /// An empty queue.
+    pub const fn new() -> TxQueue<N> {
+        TxQueue {
+            frames: Vec::new(),
+            overflows: 0,
+        }
+    }
+
+    /// Queues `frame` behind all with the same identifier.
+    ///
+    /// # Errors
+    ///
+    /// [`Overflow`], which is also counted.
+    pub fn put(&mut self, frame: Frame) -> Result<(), Overflow> {
+        let id = frame.id();
+        let position = self
+            .frames
+            .iter()
+            .position(|queued| queued.id() <= id)
+            .unwrap_or(self.frames.len());
+        self.frames.insert(position, frame).map_err(|_| {
+            self.overflows = self.overflows.saturating_add(1);
+            Overflow { id }
+        })
+    }
+
+    /// Queues `frame`, or lets it take the place of the one with the same
+    /// identifier that still waits: for process data, of which only the newest
+    /// is worth sending.
+    ///
+    /// # Errors
+    ///
+    /// [`Overflow`], which is also counted.
+    pub fn put_latest(&mut self, frame: Frame) -> Result<Put, Overflow> {
+        let same = self
+            .frames
+            .iter_mut()
+            .find(|queued| queued.id() == frame.id());
+        if let Some(queued) = same {
+            *queued = frame;
+            return Ok(Put::Replaced);
+        }
+        self.put(frame)?;
+        Ok(Put::Queued)
+    }
+
+    /// Takes the frame to be given to the controller next. `pending` are the
+    /// identifiers in the controller's buffers.
+    ///
+    /// `None` if two frames other than SYNC are there already, or if nothing
+    /// waits but identifiers that are: the controller does not keep the order of
+    /// equal identifiers, so it gets the next only when the last has left.
+    pub fn next(&mut self, pending: impl Iterator<Item = CobId> + Clone) -> Option<Frame> {
+        let others = pending.clone().filter(|id| *id != CobId::SYNC).count();
+        if others >= SHARED_BUFFERS {
+            return None;
+        }
+        let position = self
+            .frames
+            .iter()
+            .rposition(|queued| !pending.clone().any(|id| id == queued.id()))?;
+        Some(self.frames.remove(position))
+    }
+
+    /// How many frames wait.
+    pub fn len(&self) -> usize {
+        self.frames.len()
+    }
+
+    /// Whether none waits.
+    pub fn is_empty(&self) -> bool {
+        self.frames.is_empty()
+    }
+
+    /// Drops what waits: after bus-off nothing old may be sent.
+    pub fn clear(&mut self) {
+        self.frames.clear();
+    }
+
+    /// How many frames were lost because the queue was full.
+    pub fn overflows(&self) -> u32 {
+        self.overflows
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::vec::Vec as StdVec;
+
+    fn frame(id: u16, tag: u8) -> Frame {
+        Frame::data_frame(CobId::new(id).unwrap(), &[tag]).unwrap()
+    }
+
+    fn next<const N: usize>(queue: &mut TxQueue<N>, pending: &[u16]) -> Option<(u16, u8)> {
+        let pending = pending.iter().map(|id| CobId::new(*id).unwrap());
+        let frame = queue.next(pending)?;
+        Some((frame.id().get(), frame.data()[0]))
+    }
+
+    #[test]
+    fn the_lowest_identifier_goes_first_and_equal_ones_in_order() {
+        let mut queue = TxQueue::<8>::new();
+        for (id, tag) in [(0x601, 1), (0x201, 1), (0x601, 2), (0x000, 1), (0x201, 2)] {
+            queue.put(frame(id, tag)).unwrap();
+        }
+        let order: StdVec<_> = core::iter::from_fn(|| next(&mut queue, &[])).collect();
+        let expected = [(0, 1), (0x201, 1), (0x201, 2), (0x601, 1), (0x601, 2)];
+        assert_eq!(order, expected);
+    }
+
+    #[test]
+    fn an_identifier_in_the_controller_is_not_given_again() {
+        let mut queue = TxQueue::<8>::new();
+        for (id, tag) in [(0x601, 1), (0x601, 2), (0x602, 1)] {
+            queue.put(frame(id, tag)).unwrap();
+        }
+        assert_eq!(next(&mut queue, &[0x601]), Some((0x602, 1)));
+        assert_eq!(next(&mut queue, &[0x601]), None);
+        assert_eq!(next(&mut queue, &[]), Some((0x601, 1)));
+    }
+
+    #[test]
+    fn one_buffer_stays_free_for_sync() {
+        let mut queue = TxQueue::<8>::new();
+        queue.put(frame(0x201, 1)).unwrap();
+        assert_eq!(next(&mut queue, &[0x301, 0x302]), None);
+        assert_eq!(next(&mut queue, &[0x080, 0x301]), Some((0x201, 1)));
+    }
+
+    #[test]
+    fn overflow_is_told_and_counted() {
+        let mut queue = TxQueue::<2>::new();
+        queue.put(frame(0x201, 1)).unwrap();
+        queue.put(frame(0x202, 1)).unwrap();
+        let id = CobId::new(0x203).unwrap();
+        assert_eq!(queue.put(frame(0x203, 1)), Err(Overflow { id }));
+        assert_eq!(queue.put_latest(frame(0x203, 1)), Err(Overflow { id }));
+        assert_eq!(queue.put_latest(frame(0x202, 9)), Ok(Put::Replaced));
+        assert_eq!((queue.overflows(), queue.len()), (2, 2));
+    }
+
+    #[test]
+    fn process_data_is_replaced_by_newer() {
+        let mut queue = TxQueue::<4>::new();
+        assert_eq!(queue.put_latest(frame(0x201, 1)), Ok(Put::Queued));
+        assert_eq!(queue.put_latest(frame(0x201, 2)), Ok(Put::Replaced));
+        assert_eq!(next(&mut queue, &[]), Some((0x201, 2)));
+        assert!(queue.is_empty());
+    }
+
+    proptest! {
+        /// Against a model: stable sort by identifier.
+        #[test]
+        fn it_is_a_stable_sort(ids in proptest::collection::vec(0_u16..0x10, 0..20)) {
+            let mut queue = TxQueue::<32>::new();
+            for (tag, id) in ids.iter().enumerate() {
+                queue.put(frame(*id, tag as u8)).unwrap();
+            }
+            let mut model: StdVec<(u16, u8)> =
+                ids.iter().enumerate().map(|(tag, id)| (*id, tag as u8)).collect();
+            model.sort_by_key(|(id, _)| *id);
+            let order: StdVec<_> = core::iter::from_fn(|| next(&mut queue, &[])).collect();
+            prop_assert_eq!(order, model);
+        }
+    }
+}
