@@ -22,10 +22,12 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod cia402;
 pub mod design;
 pub mod frame;
 pub mod id;
 pub mod master;
+pub mod motion;
 pub mod od;
 pub mod sdo;
 pub mod time;

@@ -1,0 +1,80 @@
+//! What a group is told about its axes, all in constants.
+
+use crate::motion::position_control::Tuning;
+use crate::motion::program::Program;
+use crate::motion::scale::Scale;
+use crate::time::Duration;
+
+/// One axis of a group.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisConfig {
+    /// Increments of 6064h per turn of the motor.
+    pub increments_per_turn: u32,
+    /// Highest speed that is ever commanded, rpm. The position loop's correction
+    /// counts: leave room above the program's speeds.
+    pub velocity_max: u32,
+    /// Highest acceleration and deceleration of a move, rpm/s.
+    pub acceleration_max: u32,
+    /// Farthest target from home, increments.
+    pub travel_max: u32,
+    /// Position error that stops the group, increments.
+    pub following_error_max: u32,
+    /// Position error within which an axis has arrived, increments.
+    pub in_position: u32,
+    /// The position loop.
+    pub tuning: Tuning,
+}
+
+/// A group of `N` axes and the program that a release runs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GroupConfig<const N: usize> {
+    /// Time between two SYNCs, which is the time between two steps.
+    pub cycle: Duration,
+    /// The axes, in the order of feedback and commands.
+    pub axes: [AxisConfig; N],
+    /// What one release runs.
+    pub program: Program<N>,
+    /// Time for all axes to reach the next state on the way to operation
+    /// enabled.
+    pub enable_timeout: Duration,
+    /// Consecutive cycles without an axis' TPDO that stop the group.
+    pub missing_tpdo_max: u8,
+    /// Deceleration of the fastest axis in a stop and after a fault, rpm/s; the
+    /// others come to rest together with it.
+    pub stop_deceleration: u32,
+    /// Speed below which an axis counts as standing, rpm. Above the noise of
+    /// 606Ch.
+    pub standstill_rpm: u32,
+    /// Cycles in a row in which an axis must be in position, or at standstill,
+    /// to count as such.
+    pub settle_cycles: u8,
+    /// Time for an axis to arrive after the end of its reference, and to come
+    /// to rest after a fault.
+    pub settle_timeout: Duration,
+    /// 6083h and 6084h over the steepest slope of the reference, in percent: the
+    /// drive interpolates between two targets and still has room for the
+    /// position loop's corrections. Above 100.
+    pub ramp_percent: u32,
+    /// Smallest 6083h and 6084h, rpm/s: room for the position loop when the
+    /// reference rests.
+    pub ramp_min: u32,
+}
+
+impl<const N: usize> GroupConfig<N> {
+    /// Whole cycles that last at least `time`.
+    pub const fn cycles(&self, time: Duration) -> u32 {
+        let cycle = self.cycle.as_micros();
+        time.as_micros()
+            .div_ceil(if cycle == 0 { 1 } else { cycle })
+    }
+
+    /// The units of an axis, counted from 0; of the first if there is none.
+    pub(in crate::motion) fn scale(&self, axis: u8) -> Scale {
+        let turn = self
+            .axes
+            .get(usize::from(axis))
+            .or(self.axes.first())
+            .map_or(1, |a| a.increments_per_turn);
+        Scale::new(turn, self.cycle)
+    }
+}

@@ -1,0 +1,267 @@
+//! What a group reports, with the facts for a log.
+
+use core::fmt;
+
+use crate::cia402::{State, StatusWord, Timeout};
+use crate::motion::program::PlanError;
+
+/// State of a group of axes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum GroupState {
+    /// The network is not ready; every axis is told to stay off.
+    Idle,
+    /// The axes are led together to operation enabled, target velocity 0.
+    Enabling,
+    /// Enabled at target velocity 0; a release starts the program.
+    Standby,
+    /// The program runs.
+    Moving,
+    /// All axes ramp together to standstill, enabled; standby follows.
+    Stopping,
+    /// After a fault: the axes that still obey ramp together to standstill.
+    FaultStop,
+    /// At standstill and disabled after a fault. Only a restart of the network
+    /// leads out.
+    Faulted,
+}
+
+impl fmt::Display for GroupState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            GroupState::Idle => "idle",
+            GroupState::Enabling => "enabling",
+            GroupState::Standby => "standby",
+            GroupState::Moving => "moving",
+            GroupState::Stopping => "stopping",
+            GroupState::FaultStop => "stopping after a fault",
+            GroupState::Faulted => "faulted",
+        })
+    }
+}
+
+/// Why the group stops and disables its axes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum FaultCause {
+    /// The drive reports a fault in its statusword.
+    DriveFault {
+        /// As received.
+        status: StatusWord,
+    },
+    /// The drive left operation enabled without being told to.
+    LeftEnabled {
+        /// As received.
+        status: StatusWord,
+    },
+    /// The drive did not follow the state machine's commands in time.
+    NotEnabled(Timeout),
+    /// The axis' TPDO was missing in this many cycles in a row.
+    TpdoMissing {
+        /// Consecutive cycles.
+        cycles: u8,
+    },
+    /// The axis is too far from its reference.
+    FollowingError {
+        /// Reference minus actual position, increments.
+        error: i32,
+        /// Largest magnitude allowed.
+        allowed: u32,
+    },
+    /// The reference ended, but the axis did not come to rest on its target in
+    /// time.
+    NotArrived {
+        /// Target minus actual position, increments.
+        error: i32,
+    },
+    /// A step of the program cannot be carried out from where the axes stand.
+    Program(PlanError),
+    /// The drive's heartbeat stopped.
+    HeartbeatLost,
+    /// The drive sent an emergency message with a fault reaction.
+    Emergency {
+        /// Emergency error code.
+        code: u16,
+    },
+    /// The drive booted again or left NMT operational.
+    LeftOperational,
+    /// The network as a whole is no longer ready.
+    NetworkLost,
+}
+
+impl fmt::Display for FaultCause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            FaultCause::DriveFault { status } => write!(
+                f,
+                "the drive reports \"{}\" (statusword {:#06x}): see its emergency message",
+                status.state(),
+                status.0
+            ),
+            FaultCause::LeftEnabled { status } => write!(
+                f,
+                "the drive went to \"{}\" by itself (statusword {:#06x}): check supply, enable input and wiring",
+                status.state(),
+                status.0
+            ),
+            FaultCause::NotEnabled(timeout) => write!(f, "{timeout}"),
+            FaultCause::TpdoMissing { cycles } => write!(
+                f,
+                "no TPDO in {cycles} cycles in a row: check the cable and the drive's supply"
+            ),
+            FaultCause::FollowingError { error, allowed } => write!(
+                f,
+                "following error of {error} increments, {allowed} allowed: check for a blocked axis, load and limits"
+            ),
+            FaultCause::NotArrived { error } => {
+                write!(f, "did not arrive: {error} increments short of the target")
+            }
+            FaultCause::Program(error) => write!(f, "{error}"),
+            FaultCause::HeartbeatLost => {
+                f.write_str("heartbeat lost: check the cable and the drive's supply")
+            }
+            FaultCause::Emergency { code } => write!(f, "emergency {code:#06x}"),
+            FaultCause::LeftOperational => f.write_str("the node left NMT operational"),
+            FaultCause::NetworkLost => f.write_str("the network is no longer complete"),
+        }
+    }
+}
+
+/// Why a release was not accepted. Nothing has been sent because of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Refusal {
+    /// A release counts in standby only.
+    NotInStandby(GroupState),
+    /// A stop was requested in the same cycle.
+    StopRequested,
+    /// The axis' TPDO of this cycle is missing.
+    NotFresh {
+        /// Counted from 0.
+        axis: u8,
+    },
+    /// The axis is turning.
+    NotAtRest {
+        /// Counted from 0.
+        axis: u8,
+        /// rpm, from 606Ch.
+        velocity: i32,
+    },
+    /// The program breaks a limit.
+    Program(PlanError),
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Refusal::NotInStandby(state) => write!(f, "the group is {state}, not in standby"),
+            Refusal::StopRequested => f.write_str("a stop was requested at the same time"),
+            Refusal::NotFresh { axis } => write!(f, "axis {}: no TPDO in this cycle", axis + 1),
+            Refusal::NotAtRest { axis, velocity } => {
+                write!(f, "axis {}: still turning at {velocity} rpm", axis + 1)
+            }
+            Refusal::Program(error) => write!(f, "{error}"),
+        }
+    }
+}
+
+/// Something that happened in a step, for the log. Axes are counted from 0 and
+/// shown from 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum GroupEvent {
+    /// The group changed its state.
+    State {
+        /// Before.
+        from: GroupState,
+        /// After.
+        to: GroupState,
+    },
+    /// An axis reported another state of its state machine.
+    AxisState {
+        /// Counted from 0.
+        axis: u8,
+        /// As reported.
+        state: State,
+    },
+    /// A release was not accepted.
+    ReleaseRefused(Refusal),
+    /// A step of the program began.
+    StepStarted {
+        /// Counted from 0.
+        step: u8,
+    },
+    /// An axis came to rest on its target.
+    Arrived {
+        /// Counted from 0.
+        axis: u8,
+        /// Target in increments of 6064h.
+        target: i32,
+        /// Target minus actual position, increments.
+        error: i32,
+    },
+    /// The program ran through; the group is in standby again.
+    ProgramDone,
+    /// A fault stops the group, or came on top of one.
+    Fault {
+        /// Counted from 0; `None` where no single axis is the cause.
+        axis: Option<u8>,
+        /// What happened.
+        cause: FaultCause,
+    },
+    /// The axis is out of the master's hands: its own drive brakes it or lets
+    /// it coast, and the others stop without it.
+    Coasting {
+        /// Counted from 0.
+        axis: u8,
+        /// As last reported.
+        state: State,
+    },
+    /// After a fault the axis was not seen to come to rest in time; it is
+    /// disabled anyway.
+    NotAtRest {
+        /// Counted from 0.
+        axis: u8,
+        /// rpm, as last reported in 606Ch.
+        velocity: i32,
+    },
+    /// Events were not taken in time and are lost.
+    Lost {
+        /// How many.
+        count: u16,
+    },
+}
+
+impl fmt::Display for GroupEvent {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            GroupEvent::State { from, to } => write!(f, "group: {from} -> {to}"),
+            GroupEvent::AxisState { axis, state } => write!(f, "axis {}: {state}", axis + 1),
+            GroupEvent::ReleaseRefused(why) => write!(f, "release refused: {why}"),
+            GroupEvent::StepStarted { step } => write!(f, "program step {}", step + 1),
+            GroupEvent::Arrived {
+                axis,
+                target,
+                error,
+            } => write!(f, "axis {}: arrived at {target}, error {error}", axis + 1),
+            GroupEvent::ProgramDone => f.write_str("program done"),
+            GroupEvent::Fault {
+                axis: Some(axis),
+                cause,
+            } => write!(f, "axis {}: {cause}", axis + 1),
+            GroupEvent::Fault { axis: None, cause } => write!(f, "{cause}"),
+            GroupEvent::Coasting { axis, state } => {
+                write!(f, "axis {}: left to its drive in \"{state}\"", axis + 1)
+            }
+            GroupEvent::NotAtRest { axis, velocity } => write!(
+                f,
+                "axis {}: not seen at rest, last speed {velocity} rpm; disabled",
+                axis + 1
+            ),
+            GroupEvent::Lost { count } => write!(f, "{count} events lost"),
+        }
+    }
+}

@@ -1,0 +1,430 @@
+//! Several axes as one group with one contract for faults.
+//!
+//! [`Group::step`] is called once per SYNC cycle, when the TPDOs of this SYNC are
+//! in or late; the commands it gives are taken over by the drives at the next
+//! SYNC.
+//!
+//! The contract:
+//! 1. The group moves only after a release, given in standby, when every axis is
+//!    enabled, fresh and at rest; the program starts from actual positions.
+//! 2. A fault of one axis stops all: the commands of the very step that detects
+//!    it carry the stop, which acts at the following SYNC. The axes that still
+//!    obey ramp down so that they come to rest together; an axis disabled by
+//!    its own drive is left out.
+//! 3. Recovery leads to standby, never to motion: a faulted group waits until
+//!    the network has gone down and come up again.
+//! 4. What cannot be carried out is refused with a reason, and nothing is sent.
+
+mod axis;
+mod config;
+mod event;
+mod watch;
+
+pub use config::{AxisConfig, GroupConfig};
+pub use event::{FaultCause, GroupEvent, GroupState, Refusal};
+
+use heapless::Deque;
+
+use self::axis::Axis;
+use super::program::{self, PlanError, Step};
+use super::{Profile, Ramp, Reference};
+use crate::cia402::Goal;
+use crate::time::Instant;
+
+/// Events kept until they are taken: enough for the busiest step, in which every
+/// one of six axes fails.
+const EVENTS: usize = 24;
+
+/// What a drive reported in this cycle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct AxisFeedback {
+    /// 6041h.
+    pub statusword: u16,
+    /// 6064h, increments, sampled at this SYNC.
+    pub position: i32,
+    /// 606Ch, rpm.
+    pub velocity: i32,
+    /// 6077h, per mille of the rated torque.
+    pub torque: i16,
+    /// The TPDO with statusword and position of this SYNC has arrived. Without
+    /// it, the other values are not looked at.
+    pub fresh: bool,
+}
+
+/// What a drive is told for the next cycle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct AxisCommand {
+    /// 6040h.
+    pub controlword: u16,
+    /// 60FFh, rpm.
+    pub velocity: i32,
+    /// 6083h, rpm/s.
+    pub acceleration: u32,
+    /// 6084h, rpm/s.
+    pub deceleration: u32,
+}
+
+/// What is asked of the group in one step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Request {
+    /// Level: all mandatory nodes are checked, configured and operational.
+    pub network_ready: bool,
+    /// Edge: run the program once.
+    pub release: bool,
+    /// Edge: ramp down to standby.
+    pub stop: bool,
+    /// Edge: a fault seen elsewhere, with the axis counted from 0.
+    pub fault: Option<(usize, FaultCause)>,
+}
+
+/// `N` axes moved in step; see the module.
+pub struct Group<const N: usize> {
+    config: &'static GroupConfig<N>,
+    axes: [Axis; N],
+    state: GroupState,
+    now: Instant,
+    /// Cycles since the references were set. They start at the SYNC after that,
+    /// so that at this step's SYNC they stand at `t - 1`.
+    t: i32,
+    /// Where all axes go together while enabling.
+    stage: Goal,
+    step: usize,
+    /// Cycles of the ramp after a fault.
+    fault_ramp: u32,
+    /// The network has gone down since the fault.
+    network_was_down: bool,
+    program: Result<(), PlanError>,
+    events: Deque<GroupEvent, EVENTS>,
+    lost: u16,
+}
+
+impl<const N: usize> Group<N> {
+    /// A group in [`GroupState::Idle`]. A program that breaks the limits is
+    /// reported when it is released.
+    pub fn new(config: &'static GroupConfig<N>) -> Group<N> {
+        Group {
+            config,
+            axes: config.axes.each_ref().map(|axis| Axis::new(axis, config)),
+            state: GroupState::Idle,
+            now: Instant::ZERO,
+            t: 0,
+            stage: Goal::Disabled,
+            step: 0,
+            fault_ramp: 0,
+            network_was_down: false,
+            program: config.program.duration(config).map(|_| ()),
+            events: Deque::new(),
+            lost: 0,
+        }
+    }
+
+    /// The state after the last step.
+    pub const fn state(&self) -> GroupState {
+        self.state
+    }
+
+    /// The oldest event that was not taken yet. Take all after every step.
+    pub fn take_event(&mut self) -> Option<GroupEvent> {
+        self.events.pop_front().or_else(|| {
+            let count = core::mem::take(&mut self.lost);
+            (count > 0).then_some(GroupEvent::Lost { count })
+        })
+    }
+
+    /// One cycle: takes in what the drives reported for this SYNC and fills in
+    /// what to command for the next.
+    pub fn step(
+        &mut self,
+        request: Request,
+        feedback: &[AxisFeedback; N],
+        out: &mut [AxisCommand; N],
+    ) {
+        self.now += self.config.cycle;
+        self.t = self.t.saturating_add(1);
+        for n in 0..N {
+            self.hear(n, feedback);
+        }
+        self.watch(&request, feedback);
+        self.obey(&request, feedback);
+        self.advance(feedback);
+        for ((axis, feedback), out) in self.axes.iter_mut().zip(feedback).zip(out) {
+            *out = match self.state {
+                GroupState::Idle | GroupState::Faulted => axis.command_off(),
+                GroupState::Enabling | GroupState::Standby => axis.command_rest(self.now, feedback),
+                GroupState::Moving | GroupState::Stopping => {
+                    axis.command_follow(self.now, self.t, feedback)
+                }
+                GroupState::FaultStop => {
+                    let sent = u32::try_from(self.t).unwrap_or(0).saturating_add(1);
+                    let left = self.fault_ramp.saturating_sub(sent);
+                    axis.command_fault_stop(left, self.fault_ramp, self.config)
+                }
+            };
+        }
+    }
+
+    fn hear(&mut self, n: usize, feedback: &[AxisFeedback; N]) {
+        let (Some(axis), Some(feedback)) = (self.axes.get_mut(n), feedback.get(n)) else {
+            return;
+        };
+        if let Some(state) = axis.hear(feedback) {
+            self.report(GroupEvent::AxisState {
+                axis: n as u8,
+                state,
+            });
+        }
+    }
+
+    fn report(&mut self, event: GroupEvent) {
+        if self.events.push_back(event).is_err() {
+            self.lost = self.lost.saturating_add(1);
+        }
+    }
+
+    fn enter(&mut self, to: GroupState) {
+        let from = core::mem::replace(&mut self.state, to);
+        self.report(GroupEvent::State { from, to });
+    }
+
+    /// Requests: network up, release, stop.
+    fn obey(&mut self, request: &Request, feedback: &[AxisFeedback; N]) {
+        match self.state {
+            GroupState::Idle if request.network_ready => self.begin_enabling(),
+            GroupState::FaultStop => self.network_was_down |= !request.network_ready,
+            GroupState::Faulted if !request.network_ready => self.network_was_down = true,
+            GroupState::Faulted if self.network_was_down => self.begin_enabling(),
+            GroupState::Moving if request.stop => self.begin_stopping(),
+            _ => {}
+        }
+        if request.release
+            && let Err(refusal) = self.release(request.stop, feedback)
+        {
+            self.report(GroupEvent::ReleaseRefused(refusal));
+        }
+    }
+
+    fn begin_enabling(&mut self) {
+        self.enter(GroupState::Enabling);
+        for axis in &mut self.axes {
+            axis.restart();
+        }
+        self.set_stage(Goal::Disabled);
+    }
+
+    fn set_stage(&mut self, stage: Goal) {
+        self.stage = stage;
+        for axis in &mut self.axes {
+            axis.machine.set_goal(stage, self.now);
+        }
+    }
+
+    fn release(&mut self, stop: bool, feedback: &[AxisFeedback; N]) -> Result<(), Refusal> {
+        if self.state != GroupState::Standby {
+            return Err(Refusal::NotInStandby(self.state));
+        }
+        if stop {
+            return Err(Refusal::StopRequested);
+        }
+        for (axis, feedback) in (0u8..).zip(feedback) {
+            if !feedback.fresh {
+                return Err(Refusal::NotFresh { axis });
+            }
+            if feedback.velocity.unsigned_abs() > self.config.standstill_rpm {
+                return Err(Refusal::NotAtRest {
+                    axis,
+                    velocity: feedback.velocity,
+                });
+            }
+        }
+        self.program.map_err(Refusal::Program)?;
+        self.hold_actual(feedback);
+        self.begin_step(0).map_err(Refusal::Program)?;
+        self.enter(GroupState::Moving);
+        self.report(GroupEvent::StepStarted { step: 0 });
+        Ok(())
+    }
+
+    /// References at rest where the axes are.
+    fn hold_actual(&mut self, feedback: &[AxisFeedback; N]) {
+        self.t = 0;
+        for (axis, feedback) in self.axes.iter_mut().zip(feedback) {
+            let position = if feedback.fresh {
+                feedback.position
+            } else {
+                axis.reference.end()
+            };
+            axis.follow(Reference::Hold(position), self.config);
+        }
+    }
+
+    /// Sets the references for a step of the program, from where they end now.
+    /// Past the last step nothing changes.
+    fn begin_step(&mut self, step: usize) -> Result<(), PlanError> {
+        self.step = step;
+        match self.config.program.steps.get(step) {
+            None => {}
+            Some(Step::Dwell(_)) => {
+                for axis in &mut self.axes {
+                    axis.follow(Reference::Hold(axis.reference.end()), self.config);
+                }
+            }
+            Some(Step::Move(moves)) => {
+                let from = self
+                    .axes
+                    .each_ref()
+                    .map(|a| a.reference.end().wrapping_sub(a.home));
+                let timings = program::plan(moves, &from, self.config)?;
+                for ((axis, part), timing) in self.axes.iter_mut().zip(moves).zip(timings) {
+                    let start = axis.reference.end();
+                    let reference = match part {
+                        None => Reference::Hold(start),
+                        Some(part) => {
+                            let target = axis.home.wrapping_add(part.target);
+                            Reference::Move(Profile::new(start, target, timing))
+                        }
+                    };
+                    axis.follow(reference, self.config);
+                }
+            }
+        }
+        self.t = 0;
+        Ok(())
+    }
+
+    /// Ramps from the set-points of the next SYNC, equally long for all axes.
+    fn begin_stopping(&mut self) {
+        let mut cycles = 0;
+        for axis in &self.axes {
+            let speed = axis.scale.rpm(axis.next(self.t).velocity);
+            cycles = self.stop_cycles(speed.abs() as u32).max(cycles);
+        }
+        for axis in &mut self.axes {
+            let ramp = Ramp::new(&axis.next(self.t), cycles);
+            axis.follow(Reference::Ramp(ramp), self.config);
+        }
+        self.t = 0;
+        self.enter(GroupState::Stopping);
+    }
+
+    /// Whole cycles to stop from a speed in rpm.
+    fn stop_cycles(&self, rpm: u32) -> u32 {
+        const SECOND_US: u64 = 1_000_000;
+        let per_cycle =
+            u64::from(self.config.stop_deceleration) * u64::from(self.config.cycle.as_micros());
+        let cycles = (u64::from(rpm) * SECOND_US).div_ceil(per_cycle.max(1));
+        u32::try_from(cycles).unwrap_or(u32::MAX)
+    }
+
+    /// What goes on by itself in each state.
+    fn advance(&mut self, feedback: &[AxisFeedback; N]) {
+        match self.state {
+            GroupState::Idle | GroupState::Standby | GroupState::Faulted => {}
+            GroupState::Enabling => self.advance_enabling(feedback),
+            GroupState::Moving => self.advance_program(feedback),
+            GroupState::Stopping => self.advance_stopping(feedback),
+            GroupState::FaultStop => self.advance_fault_stop(feedback),
+        }
+    }
+
+    /// All axes reach a state before the next transition is commanded.
+    fn advance_enabling(&mut self, feedback: &[AxisFeedback; N]) {
+        if !self.axes.iter().all(|a| a.machine.reached()) {
+            return;
+        }
+        match self.stage {
+            Goal::Disabled => self.set_stage(Goal::Ready),
+            Goal::Ready => self.set_stage(Goal::SwitchedOn),
+            Goal::SwitchedOn => self.set_stage(Goal::Enabled),
+            Goal::Enabled | Goal::QuickStop => {
+                if feedback.iter().all(|f| f.fresh) {
+                    self.hold_actual(feedback);
+                    for (axis, feedback) in self.axes.iter_mut().zip(feedback) {
+                        axis.home = feedback.position;
+                    }
+                    self.enter(GroupState::Standby);
+                }
+            }
+        }
+    }
+
+    fn advance_program(&mut self, feedback: &[AxisFeedback; N]) {
+        let finished = match self.config.program.steps.get(self.step) {
+            None => true,
+            Some(Step::Dwell(time)) => {
+                u32::try_from(self.t).is_ok_and(|t| t >= self.config.cycles(*time))
+            }
+            Some(Step::Move(_)) => self.all_arrived(feedback),
+        };
+        // An arrival that failed has already begun the stop.
+        if !finished || self.state != GroupState::Moving {
+            return;
+        }
+        let next = self.step.saturating_add(1);
+        if next >= self.config.program.steps.len() {
+            self.enter(GroupState::Standby);
+            self.report(GroupEvent::ProgramDone);
+        } else if let Err(error) = self.begin_step(next) {
+            self.fault(None, FaultCause::Program(error));
+        } else {
+            self.report(GroupEvent::StepStarted { step: next as u8 });
+        }
+    }
+
+    /// Whether every axis has come to rest on its target.
+    fn all_arrived(&mut self, feedback: &[AxisFeedback; N]) -> bool {
+        let (group, t) = (self.config, self.t);
+        let patience = group.cycles(group.settle_timeout);
+        let mut all = true;
+        for n in 0..N {
+            let (Some(axis), Some(feedback)) = (self.axes.get_mut(n), feedback.get(n)) else {
+                continue;
+            };
+            if axis.arrived {
+                continue;
+            }
+            all = false;
+            if !axis.ended(t, 0) {
+                continue;
+            }
+            let error = axis.error(t, feedback.position);
+            let target = axis.reference.end();
+            if axis.settle(feedback, Some(error), group) {
+                axis.arrived = true;
+                self.report(GroupEvent::Arrived {
+                    axis: n as u8,
+                    target,
+                    error,
+                });
+            } else if axis.ended(t, patience) {
+                self.fault(Some(n), FaultCause::NotArrived { error });
+                return false;
+            }
+        }
+        all
+    }
+
+    fn advance_stopping(&mut self, feedback: &[AxisFeedback; N]) {
+        let (group, t) = (self.config, self.t);
+        let patience = group.cycles(group.settle_timeout);
+        let mut all = true;
+        for n in 0..N {
+            let (Some(axis), Some(feedback)) = (self.axes.get_mut(n), feedback.get(n)) else {
+                continue;
+            };
+            let rests = axis.ended(t, 0) && axis.settle(feedback, None, group);
+            all &= rests;
+            if !rests && axis.ended(t, patience) {
+                let error = axis.error(t, feedback.position);
+                self.fault(Some(n), FaultCause::NotArrived { error });
+                return;
+            }
+        }
+        if all {
+            self.hold_actual(feedback);
+            self.enter(GroupState::Standby);
+        }
+    }
+}

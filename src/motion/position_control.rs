@@ -1,0 +1,149 @@
+//! Position control closed in the master over the drive's velocity loop.
+//!
+//! The drive runs in profile velocity mode (CiA 402-2, clause 15) and gets a new
+//! target velocity (60FFh) every cycle. Two delays lie between a reference and
+//! the motor: what is written in cycle k is taken over at SYNC k+1, and the
+//! drive's velocity loop follows with a lag. Both are known well enough to
+//! command ahead of time; the position loop only removes what is left.
+//!
+//! - *Feed-forward*: at SYNC k the reference for SYNC k+2 is commanded, where the
+//!   drive's ramp from the target of SYNC k+1 ends, advanced by the lag.
+//! - *Lag*: starts at a nominal value and is learned while the reference
+//!   accelerates: there, a lag estimated wrongly by d shows as a constant
+//!   position error of d times the acceleration over the gain.
+//! - *Position loop*: proportional, bounded. Below the resolution of 60FFh (1
+//!   rpm) the rounding error is carried to the next cycle, so that the mean
+//!   velocity is exact and the last increment is reached. Inside the dead band
+//!   an axis whose reference rests is commanded 0: it does not hunt.
+
+use super::profile::Setpoint;
+use super::scale::Scale;
+
+/// Properties of the position loop of one axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tuning {
+    /// Proportional gain in 1/s. Its product with the loop's delay (1.5 cycles
+    /// and the lag) should stay below 0.35: then the loop does not overshoot.
+    pub gain: f32,
+    /// Lag of the drive's velocity loop to start from, in seconds.
+    pub lag: f32,
+    /// Largest lag that can be learned, in seconds.
+    pub lag_max: f32,
+    /// Share of a newly seen lag that is taken over per cycle, 0 .. 1.
+    pub learning: f32,
+    /// Bound of the position loop's output in rpm while the reference moves.
+    pub correction_rpm: f32,
+    /// The same in rpm while the reference rests: creeping to the last
+    /// increments must not count as motion.
+    pub creep_rpm: f32,
+    /// Position error in increments within which a resting axis gets velocity 0.
+    pub dead_band: u32,
+}
+
+impl Tuning {
+    /// For drives with a velocity loop of 3 .. 10 ms at a cycle of 10 ms.
+    pub const MILLISECONDS_10: Tuning = Tuning {
+        gain: 12.0,
+        lag: 0.005,
+        lag_max: 0.015,
+        learning: 0.03,
+        correction_rpm: 60.0,
+        creep_rpm: 3.0,
+        dead_band: 1,
+    };
+}
+
+/// The reference around one SYNC, as the position loop needs it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Window {
+    /// At the SYNC just passed, when the position was sampled.
+    pub now: Setpoint,
+    /// At the end of the cycle that the next command governs.
+    pub ahead: Setpoint,
+    /// Velocity one cycle later, increments per cycle.
+    pub beyond: f32,
+}
+
+impl Window {
+    /// Whether the reference rests all through the window.
+    fn rests(&self) -> bool {
+        self.now.velocity == 0.0 && self.ahead.velocity == 0.0 && self.beyond == 0.0
+    }
+}
+
+/// The position loop of one axis: what it remembers from cycle to cycle.
+#[derive(Clone, Debug)]
+pub struct PositionControl {
+    scale: Scale,
+    tuning: Tuning,
+    /// The lag as learned so far, in cycles.
+    lag: f32,
+    lag_max: f32,
+    /// Gain per cycle.
+    gain: f32,
+    /// What rounding the last command to whole rpm left over, in rpm.
+    carry: f32,
+}
+
+impl PositionControl {
+    /// A loop that has learned nothing yet.
+    pub fn new(scale: Scale, tuning: Tuning) -> PositionControl {
+        PositionControl {
+            scale,
+            tuning,
+            lag: scale.cycles(tuning.lag),
+            lag_max: scale.cycles(tuning.lag_max),
+            gain: scale.per_cycle(tuning.gain),
+            carry: 0.0,
+        }
+    }
+
+    /// The lag of the drive's velocity loop as learned so far, in cycles.
+    pub const fn lag(&self) -> f32 {
+        self.lag
+    }
+
+    /// The target velocity (60FFh) in rpm that follows the reference, at most
+    /// `limit` in magnitude.
+    ///
+    /// `position` is 6064h as sampled at `window.now`; without it (its TPDO is
+    /// missing) the axis is driven by feed-forward alone.
+    pub fn step(&mut self, window: &Window, position: Option<i32>, limit: u32) -> i32 {
+        let error = position.map(|p| window.now.minus(p));
+        let mut correction = 0.0;
+        if let Some(error) = error {
+            if window.rests() && error.abs() <= self.tuning.dead_band as f32 {
+                self.carry = 0.0;
+                return 0;
+            }
+            self.learn(window, error);
+            let bound = if window.rests() {
+                self.tuning.creep_rpm
+            } else {
+                self.tuning.correction_rpm
+            };
+            correction = self.scale.rpm(self.gain * error).clamp(-bound, bound);
+        }
+        let advanced = window.ahead.velocity + self.lag * (window.beyond - window.ahead.velocity);
+        let wanted = self.scale.rpm(advanced) + correction + self.carry;
+        let limit = limit as f32;
+        let command = round(wanted.clamp(-limit, limit));
+        self.carry = (wanted - command as f32).clamp(-1.0, 1.0);
+        command
+    }
+
+    /// A constant error while the reference accelerates is a wrong lag.
+    fn learn(&mut self, window: &Window, error: f32) {
+        let acceleration = window.now.acceleration;
+        if acceleration == 0.0 || window.ahead.acceleration != acceleration {
+            return;
+        }
+        let missing = error * self.gain / acceleration;
+        self.lag = (self.lag + self.tuning.learning * missing).clamp(0.0, self.lag_max);
+    }
+}
+
+/// To the nearest whole number, halves away from zero.
+fn round(x: f32) -> i32 {
+    (x + 0.5f32.copysign(x)) as i32
+}
