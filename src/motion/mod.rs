@@ -22,9 +22,8 @@ pub use group::{
     AxisCommand, AxisConfig, AxisFeedback, FaultCause, Group, GroupConfig, GroupEvent, GroupState,
     Refusal, Request,
 };
-pub use position_control::{PositionControl, Tuning};
-pub use profile::{Limits, Profile, Setpoint, Timing};
+pub use position_control::{PositionControl, Tuning, Window};
+pub use profile::{Limits, NotFeasible, Profile, Setpoint, Timing};
 pub use program::{AxisMove, Limit, PlanError, Program, Step};
 pub use reference::{Ramp, Reference};
 pub use scale::Scale;
-
