@@ -24,13 +24,16 @@ extern crate std;
 
 pub mod cia402;
 pub mod design;
+pub mod emcy;
 pub mod frame;
 pub mod id;
 pub mod master;
 pub mod motion;
+pub mod nmt;
 pub mod od;
 pub mod sdo;
 pub mod time;
+pub mod od;
 
 pub use frame::Frame;
 pub use id::{CobId, Index, NodeId, SubIndex};

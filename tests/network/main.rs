@@ -1,0 +1,4 @@
+//! Tests of NMT, EMCY, SYNC, the indicators and PDOs.
+
+mod emcy;
+mod nmt;
