@@ -33,7 +33,6 @@ pub mod nmt;
 pub mod od;
 pub mod sdo;
 pub mod time;
-pub mod od;
 
 pub use frame::Frame;
 pub use id::{CobId, Index, NodeId, SubIndex};
