@@ -5,7 +5,6 @@ use embedded_can::StandardId;
 
 /// A node-ID, 1..=127 (CiA 301, 7.2.1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct NodeId(u8);
 
 impl NodeId {
@@ -35,6 +34,13 @@ impl NodeId {
     }
 }
 
+#[cfg(feature = "defmt")]
+impl defmt::Format for NodeId {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(f, "{=u8}", self.0);
+    }
+}
+
 impl fmt::Display for NodeId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.0)
@@ -44,7 +50,6 @@ impl fmt::Display for NodeId {
 /// A communication object identifier: an 11-bit CAN identifier as CANopen uses
 /// it (CiA 301, 7.3.5). Extended identifiers are not used by this master.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CobId(u16);
 
 /// The largest 11-bit identifier.
@@ -107,6 +112,13 @@ impl From<CobId> for StandardId {
     fn from(id: CobId) -> StandardId {
         // A CobId never exceeds 11 bits, so the fallback is never taken.
         StandardId::new(id.0).unwrap_or(StandardId::MAX)
+    }
+}
+
+#[cfg(feature = "defmt")]
+impl defmt::Format for CobId {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(f, "{=u16:03X}h", self.0);
     }
 }
 
@@ -180,8 +192,14 @@ impl FunctionCode {
 
 /// An index of the object dictionary (CiA 301, 7.4.1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Index(pub u16);
+
+#[cfg(feature = "defmt")]
+impl defmt::Format for Index {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(f, "{=u16:04X}h", self.0);
+    }
+}
 
 impl fmt::Display for Index {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -191,8 +209,14 @@ impl fmt::Display for Index {
 
 /// A sub-index of the object dictionary (CiA 301, 7.4.1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SubIndex(pub u8);
+
+#[cfg(feature = "defmt")]
+impl defmt::Format for SubIndex {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(f, "{=u8:02X}h", self.0);
+    }
+}
 
 impl fmt::Display for SubIndex {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -202,7 +226,6 @@ impl fmt::Display for SubIndex {
 
 /// Index and sub-index together: one entry of an object dictionary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Address {
     /// The object.
     pub index: Index,
@@ -217,6 +240,13 @@ impl Address {
             index: Index(index),
             sub: SubIndex(sub),
         }
+    }
+}
+
+#[cfg(feature = "defmt")]
+impl defmt::Format for Address {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(f, "{=u16:04X}h:{=u8:02X}", self.index.0, self.sub.0);
     }
 }
 

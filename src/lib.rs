@@ -22,6 +22,7 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod boot;
 pub mod cia402;
 pub mod design;
 pub mod emcy;
@@ -29,7 +30,9 @@ pub mod frame;
 pub mod id;
 pub mod master;
 pub mod motion;
+pub mod network;
 pub mod nmt;
+pub mod objects;
 pub mod od;
 pub mod sdo;
 pub mod time;

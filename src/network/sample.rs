@@ -1,0 +1,130 @@
+//! The sample network: six maxon EPOS4 with 2000 increments per turn, on one
+//! bus at 1 Mbit/s, in profile velocity mode.
+
+use super::{ConfigWrite, Identity, MappingEntry, Master, Network, Node, Pdo};
+use crate::id::NodeId;
+use crate::objects;
+use crate::time::Duration;
+
+/// SYNC period in milliseconds; 60C2h wants it in the same unit.
+const CYCLE_MS: u8 = 10;
+
+/// EPOS4: servo drive after CiA 402.
+const EPOS4_DEVICE_TYPE: u32 = 0x0002_0192;
+/// maxon motor ag.
+const MAXON: u32 = 0x0000_00FB;
+/// EPOS4 Module 50/5: the hardware version in the upper word.
+const EPOS4_50_5: u32 = 0x6150_0000;
+/// Firmware 0170h.
+const EPOS4_REVISION: u32 = 0x0170_0000;
+
+/// Profile velocity (CiA 402, modes of operation).
+const PROFILE_VELOCITY: u8 = 3;
+/// Abort connection option: quick-stop ramp, then disabled.
+const QUICK_STOP_ON_LOST_MASTER: u16 = 3;
+
+/// No axis is ever to turn faster, rpm. Well above the program's 2400 rpm.
+const MAX_SPEED_RPM: u32 = 3000;
+/// No axis is ever to accelerate harder, rpm/s.
+const MAX_ACCELERATION_RPM_S: u32 = 20_000;
+/// From the highest speed to rest in 0.3 s: the silent phase counts on it.
+const QUICK_STOP_RPM_S: u32 = 10_000;
+
+const fn mapped(at: crate::id::Address, bits: u8) -> MappingEntry {
+    MappingEntry::new(at, bits)
+}
+
+const RPDOS: &[Pdo] = &[
+    Pdo {
+        number: 1,
+        transmission_type: 1,
+        mapping: &[
+            mapped(objects::CONTROLWORD, 16),
+            mapped(objects::TARGET_VELOCITY, 32),
+        ],
+    },
+    Pdo {
+        number: 2,
+        transmission_type: 1,
+        mapping: &[
+            mapped(objects::PROFILE_ACCELERATION, 32),
+            mapped(objects::PROFILE_DECELERATION, 32),
+        ],
+    },
+];
+
+const TPDOS: &[Pdo] = &[
+    Pdo {
+        number: 1,
+        transmission_type: 1,
+        mapping: &[
+            mapped(objects::STATUSWORD, 16),
+            mapped(objects::POSITION_ACTUAL, 32),
+        ],
+    },
+    Pdo {
+        number: 2,
+        transmission_type: 1,
+        mapping: &[
+            mapped(objects::VELOCITY_ACTUAL, 32),
+            mapped(objects::TORQUE_ACTUAL, 16),
+        ],
+    },
+];
+
+const START_VALUES: &[ConfigWrite] = &[
+    ConfigWrite::u8(objects::MODES_OF_OPERATION, PROFILE_VELOCITY),
+    ConfigWrite::u8(objects::INTERPOLATION_TIME, CYCLE_MS),
+    ConfigWrite::u32(objects::MAX_PROFILE_VELOCITY, MAX_SPEED_RPM),
+    ConfigWrite::u32(objects::MAX_MOTOR_SPEED, MAX_SPEED_RPM),
+    ConfigWrite::u32(objects::MAX_ACCELERATION, MAX_ACCELERATION_RPM_S),
+    ConfigWrite::u32(objects::QUICK_STOP_DECELERATION, QUICK_STOP_RPM_S),
+    ConfigWrite::u16(objects::ABORT_CONNECTION_OPTION, QUICK_STOP_ON_LOST_MASTER),
+];
+
+const fn epos4(id: NodeId, name: &'static str) -> Node {
+    Node {
+        id,
+        name,
+        mandatory: true,
+        identity: Identity {
+            device_type: Some(EPOS4_DEVICE_TYPE),
+            vendor: Some(MAXON),
+            product: Some(EPOS4_50_5),
+            revision: Some(EPOS4_REVISION),
+            serial: None,
+        },
+        // Ten per second each: noise on the bus, but a dead drive is known
+        // within two periods even where its TPDOs were not yet started.
+        heartbeat_ms: 100,
+        // Four of the master's periods, so that one lost frame stops nobody.
+        consumer_ms: 200,
+        rpdos: RPDOS,
+        tpdos: TPDOS,
+        start_values: START_VALUES,
+    }
+}
+
+/// Six drives on one bus: the experiment of the system that this project grew
+/// out of.
+pub static SIX_EPOS4: Network = Network {
+    bit_rate: 1_000_000,
+    cycle: Duration::from_millis(CYCLE_MS as u32),
+    master: Master {
+        node: NodeId::MAX,
+        heartbeat: Duration::from_millis(50),
+        silence: Duration::from_millis(600),
+        boot_time: Duration::from_millis(1500),
+        sdo_timeout: Duration::from_millis(100),
+        sdo_tries: 3,
+        syncs_before_start: 2,
+    },
+    nodes: &[
+        epos4(NodeId::constant::<1>(), "axis 1"),
+        epos4(NodeId::constant::<2>(), "axis 2"),
+        epos4(NodeId::constant::<3>(), "axis 3"),
+        epos4(NodeId::constant::<4>(), "axis 4"),
+        epos4(NodeId::constant::<5>(), "axis 5"),
+        epos4(NodeId::constant::<6>(), "axis 6"),
+    ],
+};
