@@ -28,13 +28,16 @@ pub mod design;
 pub mod emcy;
 pub mod frame;
 pub mod id;
+pub mod led;
 pub mod master;
 pub mod motion;
 pub mod network;
 pub mod nmt;
 pub mod objects;
 pub mod od;
+pub mod pdo;
 pub mod sdo;
+pub mod sync;
 pub mod time;
 
 pub use frame::Frame;
