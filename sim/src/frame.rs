@@ -256,6 +256,24 @@ impl BitString {
         (0..self.len).map(|i| self.get(i))
     }
 
+    /// Where bit `plain` of the stream without stuffing is on the wire.
+    pub fn wire_index(&self, plain: u32) -> u32 {
+        let (mut run, mut index) = (0, 0);
+        for _ in 0..plain {
+            run = match index {
+                0 => 1,
+                _ if self.get(index) == self.get(index - 1) => run + 1,
+                _ => 1,
+            };
+            index += 1;
+            if run == STUFF_RUN {
+                run = 1;
+                index += 1;
+            }
+        }
+        index
+    }
+
     /// Index of the last recessive to dominant edge, SOF counting as one.
     pub fn last_falling_edge(&self) -> u32 {
         (1..self.stuffed)

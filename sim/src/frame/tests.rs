@@ -29,7 +29,7 @@ fn golden_sync() {
     // 0 00010000000 0 0 0 0000 and the CRC-15 of these 19 bits.
     let sync = WireFrame::standard(0x080, &[]);
     let (header, n) = sync.header_and_data();
-    assert_eq!((header, n), (0b0_0001_0000_000_000_0000, 19));
+    assert_eq!((header, n), (0b000_0100_0000_0000_0000, 19));
     // By long division, written out apart from the code under test.
     let mut rest = header << 15;
     for i in (15..15 + n).rev() {
@@ -81,7 +81,7 @@ fn a_remote_frame_has_a_length_but_no_data() {
     let remote = WireFrame { rtr: true, ..data };
     assert!(remote.is_empty());
     assert!(remote.bits() < data.bits());
-    assert_eq!(remote.header_and_data(), (0b0_1110_0000_001_100_1000, 19));
+    assert_eq!(remote.header_and_data(), (0b011_1000_0000_1100_1000, 19));
 }
 
 #[test]
