@@ -23,6 +23,7 @@ mod controller;
 mod decoder;
 mod express;
 mod faults;
+pub mod log;
 mod node;
 mod record;
 mod types;
