@@ -230,4 +230,4 @@ impl<const N: usize> Program<N> {
 
 /// Cycles between the end of a move's reference and the next step when nothing
 /// disturbs the axes: delay of the loop, last increments, confirmation.
-const SETTLING_CYCLES: u64 = 30;
+const SETTLING_CYCLES: u64 = 12;

@@ -94,7 +94,7 @@ pub struct Group<const N: usize> {
     step: usize,
     /// Cycles of the ramp after a fault.
     fault_ramp: u32,
-    /// The network has gone down since the fault.
+    /// The network has gone down since the group stood still after a fault.
     network_was_down: bool,
     program: Result<(), PlanError>,
     events: Deque<GroupEvent, EVENTS>,
@@ -193,7 +193,6 @@ impl<const N: usize> Group<N> {
     fn obey(&mut self, request: &Request, feedback: &[AxisFeedback; N]) {
         match self.state {
             GroupState::Idle if request.network_ready => self.begin_enabling(),
-            GroupState::FaultStop => self.network_was_down |= !request.network_ready,
             GroupState::Faulted if !request.network_ready => self.network_was_down = true,
             GroupState::Faulted if self.network_was_down => self.begin_enabling(),
             GroupState::Moving if request.stop => self.begin_stopping(),

@@ -1,0 +1,10 @@
+//! The motion group against a plant: drives in profile velocity mode, each with
+//! its own lag, inertia, friction and noise. Virtual time, seeded.
+
+mod arrivals;
+mod contract;
+mod plant;
+mod profile;
+mod program;
+mod property;
+mod rig;
