@@ -23,15 +23,6 @@ pub const REVISION_NUMBER: Address = Address::new(0x1018, 3);
 /// Identity object: serial number, U32.
 pub const SERIAL_NUMBER: Address = Address::new(0x1018, 4);
 
-/// First RPDO communication parameter (CiA 301, 7.5.2.35); RPDO n is at n - 1.
-pub const RPDO_COMMUNICATION: u16 = 0x1400;
-/// First RPDO mapping parameter (CiA 301, 7.5.2.36).
-pub const RPDO_MAPPING: u16 = 0x1600;
-/// First TPDO communication parameter (CiA 301, 7.5.2.37).
-pub const TPDO_COMMUNICATION: u16 = 0x1800;
-/// First TPDO mapping parameter (CiA 301, 7.5.2.38).
-pub const TPDO_MAPPING: u16 = 0x1A00;
-
 /// Sub-index of a PDO communication parameter: COB-ID.
 pub const PDO_COB_ID: u8 = 1;
 /// Sub-index of a PDO communication parameter: transmission type.

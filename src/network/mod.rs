@@ -6,8 +6,8 @@ pub mod sample;
 
 pub use plan::{ConfigWrite, plan};
 
-use crate::id::Address;
 use crate::id::NodeId;
+use crate::pdo::{MappingEntry, Transmission};
 use crate::time::Duration;
 
 /// PDOs that every node of the predefined connection set has in each direction
@@ -93,8 +93,8 @@ pub struct Identity {
 pub struct Pdo {
     /// 1 ..= 4.
     pub number: u8,
-    /// Transmission type (CiA 301, 7.5.2.35): 1 = every SYNC.
-    pub transmission_type: u8,
+    /// Transmission type (CiA 301, 7.5.2.35).
+    pub transmission: Transmission,
     /// What it carries, first byte first.
     pub mapping: &'static [MappingEntry],
 }
@@ -106,21 +106,5 @@ impl Network {
             .iter()
             .enumerate()
             .find(|(_, node)| node.id == id)
-    }
-}
-
-/// An entry of a PDO mapping (CiA 301, 7.5.2.36).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct MappingEntry(u32);
-
-impl MappingEntry {
-    /// `bits` bits of the entry at `at`.
-    pub const fn new(at: Address, bits: u8) -> MappingEntry {
-        MappingEntry(((at.index.0 as u32) << 16) | ((at.sub.0 as u32) << 8) | bits as u32)
-    }
-
-    /// As it is written to the mapping parameter.
-    pub const fn raw(self) -> u32 {
-        self.0
     }
 }

@@ -3,6 +3,7 @@
 use super::{Network, Node, PDOS_PER_NODE, Pdo};
 use crate::id::{Address, CobId, FunctionCode, NodeId};
 use crate::objects;
+use crate::pdo::{self, Direction, PdoCobId};
 
 /// One write of a configuration: an entry of a concise DCF (CiA 302-3).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,17 +60,6 @@ impl ConfigWrite {
     }
 }
 
-/// COB-ID of a PDO: "does not exist / is not valid" (CiA 301, 7.5.2.35).
-const PDO_INVALID: u32 = 1 << 31;
-/// COB-ID of a TPDO: "no RTR allowed" (CiA 301, 7.5.2.37).
-const TPDO_NO_RTR: u32 = 1 << 30;
-
-#[derive(Clone, Copy)]
-enum Direction {
-    Receive,
-    Transmit,
-}
-
 /// Everything that is written to `node` before it is started, in order: every
 /// PDO switched off and the used ones mapped anew, then the start values, then
 /// error control, so that a node which got its heartbeat times got all else.
@@ -97,21 +87,18 @@ fn pdo_writes(
     used: &'static [Pdo],
 ) -> impl Iterator<Item = ConfigWrite> {
     let offset = u16::from(number) - 1;
-    let (communication, mapping, cob_id) = match direction {
-        Direction::Receive => (
-            objects::RPDO_COMMUNICATION + offset,
-            objects::RPDO_MAPPING + offset,
-            rpdo_cob_id(node, number),
-        ),
-        Direction::Transmit => (
-            objects::TPDO_COMMUNICATION + offset,
-            objects::TPDO_MAPPING + offset,
-            tpdo_cob_id(node, number) | TPDO_NO_RTR,
-        ),
+    let (communication, mapping) = match direction {
+        Direction::Receive => (pdo::RPDO_COMMUNICATION, pdo::RPDO_MAPPING),
+        Direction::Transmit => (pdo::TPDO_COMMUNICATION, pdo::TPDO_MAPPING),
+    };
+    let (communication, mapping) = (communication + offset, mapping + offset);
+    let cob_id = match direction {
+        Direction::Receive => cob_id(node, direction, number),
+        Direction::Transmit => cob_id(node, direction, number).without_rtr(),
     };
     let at_cob_id = Address::new(communication, objects::PDO_COB_ID);
     let count = move |n: u8| ConfigWrite::u8(Address::new(mapping, 0), n);
-    let off = ConfigWrite::u32(at_cob_id, cob_id | PDO_INVALID);
+    let off = ConfigWrite::u32(at_cob_id, cob_id.invalid().0);
 
     let remapped = used
         .iter()
@@ -119,7 +106,7 @@ fn pdo_writes(
         .map(move |pdo| {
             let entries = (1..)
                 .zip(pdo.mapping)
-                .map(move |(sub, entry)| ConfigWrite::u32(Address::new(mapping, sub), entry.raw()));
+                .map(move |(sub, entry)| ConfigWrite::u32(Address::new(mapping, sub), entry.0));
             let inhibit = matches!(direction, Direction::Transmit).then(|| {
                 ConfigWrite::u16(Address::new(communication, objects::PDO_INHIBIT_TIME), 0)
             });
@@ -129,33 +116,28 @@ fn pdo_writes(
                     count(pdo.mapping.len() as u8),
                     ConfigWrite::u8(
                         Address::new(communication, objects::PDO_TRANSMISSION_TYPE),
-                        pdo.transmission_type,
+                        pdo.transmission.code(),
                     ),
                 ])
                 .chain(inhibit)
-                .chain([ConfigWrite::u32(at_cob_id, cob_id)])
+                .chain([ConfigWrite::u32(at_cob_id, cob_id.0)])
         });
     core::iter::once(off).chain(remapped.into_iter().flatten())
 }
 
-fn rpdo_cob_id(node: NodeId, number: u8) -> u32 {
-    let function = match number {
-        1 => FunctionCode::Rpdo1,
-        2 => FunctionCode::Rpdo2,
-        3 => FunctionCode::Rpdo3,
-        _ => FunctionCode::Rpdo4,
+/// The identifier of the predefined connection set (CiA 301, 7.3.5).
+const fn cob_id(node: NodeId, direction: Direction, number: u8) -> PdoCobId {
+    let function = match (direction, number) {
+        (Direction::Receive, 1) => FunctionCode::Rpdo1,
+        (Direction::Receive, 2) => FunctionCode::Rpdo2,
+        (Direction::Receive, 3) => FunctionCode::Rpdo3,
+        (Direction::Receive, _) => FunctionCode::Rpdo4,
+        (Direction::Transmit, 1) => FunctionCode::Tpdo1,
+        (Direction::Transmit, 2) => FunctionCode::Tpdo2,
+        (Direction::Transmit, 3) => FunctionCode::Tpdo3,
+        (Direction::Transmit, _) => FunctionCode::Tpdo4,
     };
-    u32::from(CobId::of(function, node).get())
-}
-
-fn tpdo_cob_id(node: NodeId, number: u8) -> u32 {
-    let function = match number {
-        1 => FunctionCode::Tpdo1,
-        2 => FunctionCode::Tpdo2,
-        3 => FunctionCode::Tpdo3,
-        _ => FunctionCode::Tpdo4,
-    };
-    u32::from(CobId::of(function, node).get())
+    PdoCobId::valid(CobId::of(function, node))
 }
 
 #[cfg(test)]

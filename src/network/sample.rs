@@ -1,9 +1,10 @@
 //! The sample network: six maxon EPOS4 with 2000 increments per turn, on one
 //! bus at 1 Mbit/s, in profile velocity mode.
 
-use super::{ConfigWrite, Identity, MappingEntry, Master, Network, Node, Pdo};
+use super::{ConfigWrite, Identity, Master, Network, Node, Pdo};
 use crate::id::NodeId;
 use crate::objects;
+use crate::pdo::{MappingEntry, Transmission};
 use crate::time::Duration;
 
 /// SYNC period in milliseconds; 60C2h wants it in the same unit.
@@ -31,13 +32,16 @@ const MAX_ACCELERATION_RPM_S: u32 = 20_000;
 const QUICK_STOP_RPM_S: u32 = 10_000;
 
 const fn mapped(at: crate::id::Address, bits: u8) -> MappingEntry {
-    MappingEntry::new(at, bits)
+    MappingEntry::new(at.index.0, at.sub.0, bits)
 }
+
+/// Taken over, or sampled, at every SYNC.
+const EVERY_SYNC: Transmission = Transmission::Synchronous(1);
 
 const RPDOS: &[Pdo] = &[
     Pdo {
         number: 1,
-        transmission_type: 1,
+        transmission: EVERY_SYNC,
         mapping: &[
             mapped(objects::CONTROLWORD, 16),
             mapped(objects::TARGET_VELOCITY, 32),
@@ -45,7 +49,7 @@ const RPDOS: &[Pdo] = &[
     },
     Pdo {
         number: 2,
-        transmission_type: 1,
+        transmission: EVERY_SYNC,
         mapping: &[
             mapped(objects::PROFILE_ACCELERATION, 32),
             mapped(objects::PROFILE_DECELERATION, 32),
@@ -56,7 +60,7 @@ const RPDOS: &[Pdo] = &[
 const TPDOS: &[Pdo] = &[
     Pdo {
         number: 1,
-        transmission_type: 1,
+        transmission: EVERY_SYNC,
         mapping: &[
             mapped(objects::STATUSWORD, 16),
             mapped(objects::POSITION_ACTUAL, 32),
@@ -64,7 +68,7 @@ const TPDOS: &[Pdo] = &[
     },
     Pdo {
         number: 2,
-        transmission_type: 1,
+        transmission: EVERY_SYNC,
         mapping: &[
             mapped(objects::VELOCITY_ACTUAL, 32),
             mapped(objects::TORQUE_ACTUAL, 16),
