@@ -1,0 +1,255 @@
+//! The object dictionary of one drive: the values of [`objects`](super::objects)
+//! and the rules that go beyond type, access and range.
+
+use super::config::Identity;
+use super::errors::Errors;
+use super::modes::Mode;
+use super::objects::{self, OBJECT_COUNT, PDOS, TABLE};
+use super::pdo::{self, Direction};
+use canmaster::id::{Address, FunctionCode};
+use canmaster::od::{Chunk, Entry, ObjectDictionary, Value, Values};
+use canmaster::sdo::AbortCode;
+use canmaster::{CobId, NodeId};
+
+/// "save", as 1010h wants it.
+const SAVE: u32 = u32::from_le_bytes(*b"save");
+/// "load", as 1011h wants it.
+const LOAD: u32 = u32::from_le_bytes(*b"load");
+/// Objects that a reset of the communication sets back.
+const COMMUNICATION_AREA: (u16, u16) = (0x1000, 0x1FFF);
+/// TPDO identifier: no RTR.
+const NO_RTR: i64 = 1 << 30;
+/// PDO does not exist.
+const INVALID: i64 = 1 << 31;
+/// rpm, without prefix (60A9h).
+const UNIT_RPM: u32 = 0x00B4_4700;
+/// Codes of 2001h: LSS bit rates and 9, automatic.
+const BIT_RATES: [u8; 8] = [0, 1, 2, 3, 4, 6, 7, 9];
+/// Node-ID of an unconfigured device.
+const UNCONFIGURED: u8 = 255;
+const HOMING_METHODS: [i8; 15] = [37, 34, 33, 27, 23, 18, 17, 11, 7, 2, 1, -1, -2, -3, -4];
+/// DC, sinusoidal PM, trapezoidal PM (6402h).
+const MOTOR_TYPES: [u16; 3] = [1, 10, 11];
+
+/// The dictionary.
+#[derive(Clone, Debug)]
+pub struct Dictionary {
+    values: Values<OBJECT_COUNT>,
+    /// What the next reset loads: the factory's values or those saved.
+    stored: Values<OBJECT_COUNT>,
+    node: NodeId,
+    identity: Identity,
+    /// Behind 1001h, 1003h and 603Fh.
+    pub errors: Errors,
+    /// Mappings cannot be changed then.
+    pub operational: bool,
+    /// Entries whose next writing is refused, for tests of the master.
+    pub refused: Vec<(Address, AbortCode)>,
+    written: Vec<Address>,
+}
+
+impl Dictionary {
+    /// With the factory's values.
+    pub fn new(node: NodeId, identity: Identity) -> Dictionary {
+        let stored = factory(node, identity);
+        Dictionary {
+            values: stored.clone(),
+            stored,
+            node,
+            identity,
+            errors: Errors::default(),
+            operational: false,
+            refused: Vec::new(),
+            written: Vec::new(),
+        }
+    }
+
+    /// NMT reset node, power-on: everything is loaded from the store. The
+    /// history of errors is kept.
+    pub fn reset_node(&mut self) {
+        self.values = self.stored.clone();
+        self.errors.reset();
+        self.errors.communication_reset();
+        self.written.clear();
+    }
+
+    /// NMT reset communication: 1000h..1FFFh are loaded from the store.
+    pub fn reset_communication(&mut self) {
+        let (from, to) = COMMUNICATION_AREA;
+        for object in TABLE.objects() {
+            let (index, sub) = (object.at.index.0, object.at.sub.0);
+            if (from..=to).contains(&index) {
+                self.values.put(index, sub, self.stored.number(index, sub));
+            }
+        }
+        self.errors.communication_reset();
+    }
+
+    /// The value of an entry; 0 for one that does not exist.
+    pub fn number(&self, index: u16, sub: u8) -> i64 {
+        self.values.number(index, sub)
+    }
+
+    /// Sets a value from within the drive.
+    pub fn put(&mut self, index: u16, sub: u8, number: i64) {
+        let exists = self.values.put(index, sub, number);
+        debug_assert!(exists, "{index:04X}h:{sub:02X} is in the table");
+    }
+
+    /// A speed of the dictionary in rpm (60A9h).
+    pub fn rpm(&self, index: u16, sub: u8) -> f64 {
+        self.number(index, sub) as f64 * self.velocity_unit()
+    }
+
+    /// rpm per velocity unit: a power of ten.
+    pub fn velocity_unit(&self) -> f64 {
+        let prefix = (self.number(0x60A9, 0) as u32 >> 24) as u8 as i8;
+        10f64.powi(i32::from(prefix))
+    }
+
+    /// The entries written since the last call, in order.
+    pub fn take_written(&mut self) -> Vec<Address> {
+        std::mem::take(&mut self.written)
+    }
+
+    /// A value that arrived in an RPDO. What the entry does not accept is
+    /// passed over: a PDO has no answer.
+    pub fn receive(&mut self, at: Address, data: &[u8]) {
+        let Ok(entry) = self.values.entry(at) else {
+            return;
+        };
+        let Ok(value) = Value::from_bytes(entry.data_type, data) else {
+            return;
+        };
+        if entry.in_range(value).is_ok() && self.accept(at, value).is_ok() {
+            self.written.push(at);
+        }
+    }
+
+    /// The rules of single objects, and the new value.
+    fn accept(&mut self, at: Address, value: Value) -> Result<(), AbortCode> {
+        let number = value.as_u32();
+        let (index, sub) = (at.index.0, at.sub.0);
+        match index {
+            0x1003 => {
+                check(number == 0, AbortCode::VALUE_RANGE)?;
+                self.errors.clear_history();
+                return Ok(());
+            }
+            0x1010 => {
+                check(number == SAVE, AbortCode::CANNOT_STORE)?;
+                self.stored = self.values.clone();
+                return Ok(());
+            }
+            0x1011 => {
+                check(number == LOAD, AbortCode::CANNOT_STORE)?;
+                self.stored = factory(self.node, self.identity);
+                return Ok(());
+            }
+            0x1016 => self.check_consumer(sub, number)?,
+            0x2000 => check(
+                NodeId::new(value.as_u8()).is_some() || value.as_u8() == UNCONFIGURED,
+                AbortCode::VALUE_RANGE,
+            )?,
+            0x2001 => listed(&BIT_RATES, value.as_u8())?,
+            0x6060 => {
+                check(
+                    Mode::from_code(value.as_i32() as i8).is_some(),
+                    AbortCode::VALUE_RANGE,
+                )?;
+            }
+            0x6098 => listed(&HOMING_METHODS, value.as_i32() as i8)?,
+            0x6402 => listed(&MOTOR_TYPES, value.as_u16())?,
+            0x60A9 => check(velocity_unit_allowed(number), AbortCode::VALUE_RANGE)?,
+            _ => pdo::check(self, self.node, at, number)?,
+        }
+        self.values.put(index, sub, value.as_i64());
+        Ok(())
+    }
+
+    /// 1016h: a node is watched once (CiA 301, 7.5.2.14).
+    fn check_consumer(&self, sub: u8, number: u32) -> Result<(), AbortCode> {
+        let other = self.number(0x1016, if sub == 1 { 2 } else { 1 }) as u32;
+        let (node, time) = (number >> 16 & 0xFF, number & 0xFFFF);
+        let same = time != 0 && other & 0xFFFF != 0 && other >> 16 & 0xFF == node;
+        check(!same, AbortCode::PARAMETER_INCOMPATIBLE)?;
+        let known = time == 0 || node <= u32::from(NodeId::MAX.get());
+        check(known, AbortCode::VALUE_RANGE)
+    }
+}
+
+impl ObjectDictionary for Dictionary {
+    fn entry(&self, at: Address) -> Result<Entry, AbortCode> {
+        self.values.entry(at)
+    }
+
+    fn get(&mut self, at: Address) -> Result<Value, AbortCode> {
+        let sub = at.sub.0;
+        Ok(match at.index.0 {
+            0x1001 => self.errors.register().into(),
+            0x1003 if sub == 0 => self.errors.count().into(),
+            0x1003 => u32::from(self.errors.entry(sub).unwrap_or(0)).into(),
+            0x603F => self.errors.last().into(),
+            _ => return self.values.get(at),
+        })
+    }
+
+    fn set(&mut self, at: Address, value: Value) -> Result<(), AbortCode> {
+        if let Some((_, code)) = self.refused.iter().find(|(entry, _)| *entry == at) {
+            return Err(*code);
+        }
+        self.accept(at, value)?;
+        self.written.push(at);
+        Ok(())
+    }
+
+    fn read(&mut self, at: Address, offset: u32, buf: &mut [u8]) -> Result<Chunk, AbortCode> {
+        self.values.read(at, offset, buf)
+    }
+}
+
+/// The values of a drive that was never configured.
+fn factory(node: NodeId, identity: Identity) -> Values<OBJECT_COUNT> {
+    let mut values = Values::new(TABLE);
+    let of = |function| i64::from(CobId::of(function, node).get());
+    let mut put = |index, sub, number| {
+        let exists = values.put(index, sub, number);
+        debug_assert!(exists, "{index:04X}h:{sub:02X} is in the table");
+    };
+    put(0x1000, 0, identity.device_type.into());
+    put(0x1014, 0, of(FunctionCode::Emcy));
+    put(0x1018, 1, identity.vendor.into());
+    put(0x1018, 2, identity.product.into());
+    put(0x1018, 3, identity.revision.into());
+    put(0x1018, 4, identity.serial.into());
+    put(0x1200, 1, of(FunctionCode::SdoRequest));
+    put(0x1200, 2, of(FunctionCode::SdoResponse));
+    put(0x2000, 0, node.get().into());
+    for number in 0..PDOS {
+        let off = if number == 0 { 0 } else { INVALID };
+        put(
+            objects::RPDO_COMMUNICATION + number,
+            1,
+            i64::from(Direction::Receive.default_id(number, node)),
+        );
+        put(
+            objects::TPDO_COMMUNICATION + number,
+            1,
+            i64::from(Direction::Transmit.default_id(number, node)) | NO_RTR | off,
+        );
+    }
+    values
+}
+
+fn check(good: bool, code: AbortCode) -> Result<(), AbortCode> {
+    if good { Ok(()) } else { Err(code) }
+}
+
+fn listed<T: PartialEq>(list: &[T], value: T) -> Result<(), AbortCode> {
+    check(list.contains(&value), AbortCode::VALUE_RANGE)
+}
+
+fn velocity_unit_allowed(number: u32) -> bool {
+    let prefix = (number >> 24) as u8 as i8;
+    number & 0x00FF_FFFF == UNIT_RPM && (-6..=0).contains(&prefix)
+}

@@ -1,0 +1,278 @@
+//! The velocity controller of the drive and the plant that it drives.
+//!
+//! The controller follows the demand through a first-order model whose time
+//! constant is the loop's: torque is fed forward for the nominal inertia, and a
+//! proportional-integral part, both closed-loop poles at the same time
+//! constant, takes out friction, disturbance and the inertia that differs from
+//! the nominal one.
+
+use super::plant::{Plant, PlantConfig, PlantState};
+use super::random::Random;
+
+/// Speed below which the axis counts as standing (30E0h:1), rpm.
+pub const STANDSTILL_RPM: f64 = 30.0;
+/// For how long it has to stay below (30E0h:2), seconds.
+pub const STANDSTILL_WINDOW_S: f64 = 0.002;
+/// After how long without demand the drive goes on anyway (30E0h:3), seconds.
+pub const STANDSTILL_TIMEOUT_S: f64 = 1.0;
+/// Averaging time of 30D3h:1, seconds.
+const AVERAGING_S: f64 = 0.01;
+
+/// How a drive's velocity loop is set.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ServoConfig {
+    /// Time constant of the closed velocity loop in seconds, 0.003 ..= 0.010.
+    pub time_constant_s: f64,
+    /// Largest torque, per mille of rated torque.
+    pub peak_torque_permille: f64,
+    /// Noise of 606Ch in rpm, uniform to both sides.
+    pub velocity_noise_rpm: f64,
+    /// Noise of 6077h, per mille of rated torque, uniform to both sides.
+    pub torque_noise_permille: f64,
+}
+
+impl Default for ServoConfig {
+    fn default() -> ServoConfig {
+        ServoConfig {
+            time_constant_s: 0.005,
+            peak_torque_permille: 2000.0,
+            velocity_noise_rpm: 1.0,
+            torque_noise_permille: 2.0,
+        }
+    }
+}
+
+/// What the drive measures.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Measured {
+    /// 6064h: increments, wrapping at 32 bits as the drive's counter does.
+    pub position: i32,
+    /// 606Ch, rpm.
+    pub velocity: f64,
+    /// 30D3h:1, rpm, averaged.
+    pub velocity_averaged: f64,
+    /// 6077h, per mille of rated torque.
+    pub torque: f64,
+    /// Speed stayed below the standstill window for its time.
+    pub standstill: bool,
+}
+
+/// Velocity controller and plant.
+#[derive(Clone, Debug)]
+pub struct Servo {
+    config: ServoConfig,
+    /// Rated torques per rpm/s, nominal inertia.
+    inertia: f64,
+    plant: Plant,
+    noise: Random,
+    /// Speed of the first-order model, rpm; `None` while the power stage is off.
+    model: Option<f64>,
+    integral: f64,
+    quiet_s: f64,
+    measured: Measured,
+}
+
+impl Servo {
+    /// At rest, power stage off.
+    pub fn new(config: ServoConfig, plant: PlantConfig, seed: u64) -> Servo {
+        let inertia = 1.0 / plant.rated_acceleration;
+        let plant = Plant::new(plant, Random::new(seed, super::random::DISTURBANCE));
+        let measured = Measured {
+            position: plant.encoder() as i32,
+            standstill: true,
+            ..Measured::default()
+        };
+        Servo {
+            config,
+            inertia,
+            plant,
+            noise: Random::new(seed, super::random::MEASUREMENT),
+            model: None,
+            integral: 0.0,
+            quiet_s: STANDSTILL_WINDOW_S,
+            measured,
+        }
+    }
+
+    /// What is true.
+    pub fn truth(&self) -> PlantState {
+        self.plant.state()
+    }
+
+    /// What the drive knows.
+    pub fn measured(&self) -> Measured {
+        self.measured
+    }
+
+    /// One control cycle: `demand` in rpm, or `None` with the power stage off.
+    /// `own_s` is the cycle as the drive's clock has it, `true_s` as it is.
+    pub fn step(&mut self, demand: Option<f64>, own_s: f64, true_s: f64) {
+        // The drive divides increments by its own idea of time.
+        let seen = self.plant.state().velocity_rpm * true_s / own_s;
+        let torque = match demand {
+            Some(demand) => self.control(demand, seen, own_s),
+            None => {
+                self.model = None;
+                self.integral = 0.0;
+                0.0
+            }
+        };
+        self.plant.step(torque, true_s);
+        self.measure(torque, own_s, true_s);
+    }
+
+    fn control(&mut self, demand: f64, seen: f64, dt: f64) -> f64 {
+        let tau = self.config.time_constant_s;
+        // Switching on takes the axis over at the speed that it has.
+        let before = self.model.unwrap_or(seen);
+        let after = demand + (before - demand) * (-dt / tau).exp();
+        self.model = Some(after);
+
+        let error = before - seen;
+        let feed_forward = self.inertia * (after - before) / dt;
+        let proportional = self.inertia * 2.0 / tau * error;
+        let limit = self.config.peak_torque_permille / 1000.0;
+        let wanted = feed_forward + proportional + self.integral;
+        let torque = wanted.clamp(-limit, limit);
+        // At the limit the integral would only wind up.
+        if torque == wanted {
+            self.integral += self.inertia / (tau * tau) * error * dt;
+        }
+        torque
+    }
+
+    fn measure(&mut self, torque: f64, own_s: f64, true_s: f64) {
+        let velocity = self.plant.state().velocity_rpm * true_s / own_s;
+        let noisy = velocity + self.config.velocity_noise_rpm * self.noise.symmetric();
+        let share = own_s / AVERAGING_S;
+        self.quiet_s = if velocity.abs() < STANDSTILL_RPM {
+            self.quiet_s + own_s
+        } else {
+            0.0
+        };
+        self.measured = Measured {
+            position: self.plant.encoder() as i32,
+            velocity: noisy,
+            velocity_averaged: self.measured.velocity_averaged
+                + share * (noisy - self.measured.velocity_averaged),
+            torque: torque * 1000.0 + self.config.torque_noise_permille * self.noise.symmetric(),
+            standstill: self.quiet_s >= STANDSTILL_WINDOW_S,
+        };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DT: f64 = 0.0004;
+
+    fn servo(tau: f64, inertia_ratio: f64, friction_permille: f64, seed: u64) -> Servo {
+        Servo::new(
+            ServoConfig {
+                time_constant_s: tau,
+                ..ServoConfig::default()
+            },
+            PlantConfig {
+                inertia_ratio,
+                friction_permille,
+                ..PlantConfig::default()
+            },
+            seed,
+        )
+    }
+
+    /// Time until 63 % of a step of 50 rpm on top of 1000 rpm.
+    fn rise(servo: &mut Servo) -> f64 {
+        for _ in 0..2500 {
+            servo.step(Some(1000.0), DT, DT);
+        }
+        let mut steps = 0;
+        while servo.truth().velocity_rpm < 1000.0 + 50.0 * 0.632 {
+            servo.step(Some(1050.0), DT, DT);
+            steps += 1;
+        }
+        f64::from(steps) * DT
+    }
+
+    #[test]
+    fn the_loop_has_its_time_constant_whatever_the_inertia() {
+        for tau in [0.003, 0.005, 0.010] {
+            for ratio in [0.7, 1.0, 1.3] {
+                let seen = rise(&mut servo(tau, ratio, 35.0, 3));
+                assert!((0.6 * tau..1.6 * tau).contains(&seen), "{tau} {ratio}: {seen}");
+            }
+        }
+    }
+
+    #[test]
+    fn zero_demand_ends_in_a_true_standstill() {
+        for seed in 0..20 {
+            for (tau, ratio, friction) in [(0.003, 0.7, 20.0), (0.010, 1.3, 50.0)] {
+                let mut s = servo(tau, ratio, friction, seed);
+                for _ in 0..1000 {
+                    s.step(Some(1500.0), DT, DT);
+                }
+                for _ in 0..2500 {
+                    s.step(Some(0.0), DT, DT);
+                }
+                let stopped = s.truth();
+                for _ in 0..25_000 {
+                    s.step(Some(0.0), DT, DT);
+                }
+                let creep = s.truth().travelled_inc - stopped.travelled_inc;
+                assert!(creep < 0.5, "seed {seed} tau {tau}: {creep} increments");
+                assert!(s.measured().standstill);
+            }
+        }
+    }
+
+    #[test]
+    fn constant_demand_is_held_on_average() {
+        let mut s = servo(0.010, 1.3, 50.0, 9);
+        for _ in 0..2500 {
+            s.step(Some(-2000.0), DT, DT);
+        }
+        let from = s.truth().position_inc;
+        for _ in 0..25_000 {
+            s.step(Some(-2000.0), DT, DT);
+        }
+        let way = s.truth().position_inc - from;
+        let exact = -2000.0 / 60.0 * 2000.0 * 10.0;
+        assert!((way - exact).abs() < 20.0, "{way} {exact}");
+    }
+
+    #[test]
+    fn without_power_the_axis_coasts_and_the_loop_forgets() {
+        let mut s = servo(0.005, 1.0, 20.0, 2);
+        for _ in 0..2500 {
+            s.step(Some(600.0), DT, DT);
+        }
+        s.step(None, DT, DT);
+        assert!(s.truth().velocity_rpm > 590.0);
+        assert_eq!(s.truth().torque, 0.0);
+        s.step(Some(600.0), DT, DT);
+        assert!(s.truth().torque.abs() < 0.1, "no jump when switched on");
+    }
+
+    #[test]
+    fn reported_velocity_is_within_its_noise() {
+        let mut s = servo(0.005, 1.0, 35.0, 4);
+        for _ in 0..1000 {
+            s.step(None, DT, DT);
+            assert!(s.measured().velocity.abs() <= 1.0);
+        }
+    }
+
+    #[test]
+    fn a_fast_clock_measures_a_slower_motor() {
+        let mut s = servo(0.005, 1.0, 35.0, 5);
+        let true_s = DT * (1.0 - 1e-4);
+        for _ in 0..50_000 {
+            s.step(Some(3000.0), DT, true_s);
+        }
+        // Its second is shorter, so that it turns faster than it believes.
+        let velocity = s.truth().velocity_rpm;
+        assert!((velocity - 3000.3).abs() < 5.0, "{velocity}");
+    }
+}
