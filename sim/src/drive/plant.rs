@@ -91,9 +91,9 @@ impl Plant {
         self.state
     }
 
-    /// The increment in which the encoder stands.
+    /// The increment that the encoder counts: it is true to half an increment.
     pub fn encoder(&self) -> i64 {
-        self.state.position_inc.floor() as i64
+        self.state.position_inc.round() as i64
     }
 
     /// One control cycle of `seconds` true time with constant motor torque.

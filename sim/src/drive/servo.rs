@@ -9,13 +9,24 @@
 use super::plant::{Plant, PlantConfig, PlantState};
 use super::random::Random;
 
-/// Speed below which the axis counts as standing (30E0h:1), rpm.
-pub const STANDSTILL_RPM: f64 = 30.0;
-/// For how long it has to stay below (30E0h:2), seconds.
-pub const STANDSTILL_WINDOW_S: f64 = 0.002;
-/// After how long without demand the drive goes on anyway (30E0h:3), seconds.
-pub const STANDSTILL_TIMEOUT_S: f64 = 1.0;
-/// Averaging time of 30D3h:1, seconds.
+/// When the axis counts as standing (30E0h).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Standstill {
+    /// 30E0h:1, rpm.
+    pub speed_rpm: f64,
+    /// 30E0h:2: for how long the speed has to stay below, seconds.
+    pub window_s: f64,
+}
+
+impl Standstill {
+    /// As the factory sets it.
+    pub const DEFAULT: Standstill = Standstill {
+        speed_rpm: 30.0,
+        window_s: 0.002,
+    };
+}
+
+/// Averaging time of 30D2h:1 and 30D3h:1, seconds.
 const AVERAGING_S: f64 = 0.01;
 
 /// How a drive's velocity loop is set.
@@ -53,6 +64,8 @@ pub struct Measured {
     pub velocity_averaged: f64,
     /// 6077h, per mille of rated torque.
     pub torque: f64,
+    /// 30D2h:1, per mille of rated torque, averaged.
+    pub torque_averaged: f64,
     /// Speed stayed below the standstill window for its time.
     pub standstill: bool,
 }
@@ -89,7 +102,7 @@ impl Servo {
             noise: Random::new(seed, super::random::MEASUREMENT),
             model: None,
             integral: 0.0,
-            quiet_s: STANDSTILL_WINDOW_S,
+            quiet_s: Standstill::DEFAULT.window_s,
             measured,
         }
     }
@@ -104,9 +117,14 @@ impl Servo {
         self.measured
     }
 
+    /// Whether the motor had torque in the last cycle.
+    pub fn powered(&self) -> bool {
+        self.model.is_some()
+    }
+
     /// One control cycle: `demand` in rpm, or `None` with the power stage off.
     /// `own_s` is the cycle as the drive's clock has it, `true_s` as it is.
-    pub fn step(&mut self, demand: Option<f64>, own_s: f64, true_s: f64) {
+    pub fn step(&mut self, demand: Option<f64>, still: Standstill, own_s: f64, true_s: f64) {
         // The drive divides increments by its own idea of time.
         let seen = self.plant.state().velocity_rpm * true_s / own_s;
         let torque = match demand {
@@ -118,7 +136,7 @@ impl Servo {
             }
         };
         self.plant.step(torque, true_s);
-        self.measure(torque, own_s, true_s);
+        self.measure(torque, still, own_s, true_s);
     }
 
     fn control(&mut self, demand: f64, seen: f64, dt: f64) -> f64 {
@@ -141,11 +159,12 @@ impl Servo {
         torque
     }
 
-    fn measure(&mut self, torque: f64, own_s: f64, true_s: f64) {
+    fn measure(&mut self, torque: f64, still: Standstill, own_s: f64, true_s: f64) {
         let velocity = self.plant.state().velocity_rpm * true_s / own_s;
         let noisy = velocity + self.config.velocity_noise_rpm * self.noise.symmetric();
-        let share = own_s / AVERAGING_S;
-        self.quiet_s = if velocity.abs() < STANDSTILL_RPM {
+        let torque = torque * 1000.0 + self.config.torque_noise_permille * self.noise.symmetric();
+        let averaged = |before: f64, now: f64| before + own_s / AVERAGING_S * (now - before);
+        self.quiet_s = if velocity.abs() < still.speed_rpm {
             self.quiet_s + own_s
         } else {
             0.0
@@ -153,10 +172,10 @@ impl Servo {
         self.measured = Measured {
             position: self.plant.encoder() as i32,
             velocity: noisy,
-            velocity_averaged: self.measured.velocity_averaged
-                + share * (noisy - self.measured.velocity_averaged),
-            torque: torque * 1000.0 + self.config.torque_noise_permille * self.noise.symmetric(),
-            standstill: self.quiet_s >= STANDSTILL_WINDOW_S,
+            velocity_averaged: averaged(self.measured.velocity_averaged, noisy),
+            torque,
+            torque_averaged: averaged(self.measured.torque_averaged, torque),
+            standstill: self.quiet_s >= still.window_s,
         };
     }
 }
@@ -185,11 +204,11 @@ mod tests {
     /// Time until 63 % of a step of 50 rpm on top of 1000 rpm.
     fn rise(servo: &mut Servo) -> f64 {
         for _ in 0..2500 {
-            servo.step(Some(1000.0), DT, DT);
+            servo.step(Some(1000.0), Standstill::DEFAULT, DT, DT);
         }
         let mut steps = 0;
         while servo.truth().velocity_rpm < 1000.0 + 50.0 * 0.632 {
-            servo.step(Some(1050.0), DT, DT);
+            servo.step(Some(1050.0), Standstill::DEFAULT, DT, DT);
             steps += 1;
         }
         f64::from(steps) * DT
@@ -211,14 +230,14 @@ mod tests {
             for (tau, ratio, friction) in [(0.003, 0.7, 20.0), (0.010, 1.3, 50.0)] {
                 let mut s = servo(tau, ratio, friction, seed);
                 for _ in 0..1000 {
-                    s.step(Some(1500.0), DT, DT);
+                    s.step(Some(1500.0), Standstill::DEFAULT, DT, DT);
                 }
                 for _ in 0..2500 {
-                    s.step(Some(0.0), DT, DT);
+                    s.step(Some(0.0), Standstill::DEFAULT, DT, DT);
                 }
                 let stopped = s.truth();
                 for _ in 0..25_000 {
-                    s.step(Some(0.0), DT, DT);
+                    s.step(Some(0.0), Standstill::DEFAULT, DT, DT);
                 }
                 let creep = s.truth().travelled_inc - stopped.travelled_inc;
                 assert!(creep < 0.5, "seed {seed} tau {tau}: {creep} increments");
@@ -231,11 +250,11 @@ mod tests {
     fn constant_demand_is_held_on_average() {
         let mut s = servo(0.010, 1.3, 50.0, 9);
         for _ in 0..2500 {
-            s.step(Some(-2000.0), DT, DT);
+            s.step(Some(-2000.0), Standstill::DEFAULT, DT, DT);
         }
         let from = s.truth().position_inc;
         for _ in 0..25_000 {
-            s.step(Some(-2000.0), DT, DT);
+            s.step(Some(-2000.0), Standstill::DEFAULT, DT, DT);
         }
         let way = s.truth().position_inc - from;
         let exact = -2000.0 / 60.0 * 2000.0 * 10.0;
@@ -246,12 +265,12 @@ mod tests {
     fn without_power_the_axis_coasts_and_the_loop_forgets() {
         let mut s = servo(0.005, 1.0, 20.0, 2);
         for _ in 0..2500 {
-            s.step(Some(600.0), DT, DT);
+            s.step(Some(600.0), Standstill::DEFAULT, DT, DT);
         }
-        s.step(None, DT, DT);
+        s.step(None, Standstill::DEFAULT, DT, DT);
         assert!(s.truth().velocity_rpm > 590.0);
         assert_eq!(s.truth().torque, 0.0);
-        s.step(Some(600.0), DT, DT);
+        s.step(Some(600.0), Standstill::DEFAULT, DT, DT);
         assert!(s.truth().torque.abs() < 0.1, "no jump when switched on");
     }
 
@@ -259,7 +278,7 @@ mod tests {
     fn reported_velocity_is_within_its_noise() {
         let mut s = servo(0.005, 1.0, 35.0, 4);
         for _ in 0..1000 {
-            s.step(None, DT, DT);
+            s.step(None, Standstill::DEFAULT, DT, DT);
             assert!(s.measured().velocity.abs() <= 1.0);
         }
     }
@@ -269,7 +288,7 @@ mod tests {
         let mut s = servo(0.005, 1.0, 35.0, 5);
         let true_s = DT * (1.0 - 1e-4);
         for _ in 0..50_000 {
-            s.step(Some(3000.0), DT, true_s);
+            s.step(Some(3000.0), Standstill::DEFAULT, DT, true_s);
         }
         // Its second is shorter, so that it turns faster than it believes.
         let velocity = s.truth().velocity_rpm;

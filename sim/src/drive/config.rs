@@ -1,0 +1,189 @@
+//! What one simulated drive is like, and what is wrong with it.
+
+use super::plant::PlantConfig;
+use super::random::{self, Random};
+use super::servo::ServoConfig;
+use crate::time::Time;
+use canmaster::NodeId;
+
+/// Drawn uniformly from this for each use, microseconds of the drive's clock.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Spread {
+    /// The shortest.
+    pub min_us: u64,
+    /// The longest.
+    pub max_us: u64,
+}
+
+impl Spread {
+    /// From `min_us` to `max_us`.
+    pub const fn new(min_us: u64, max_us: u64) -> Spread {
+        Spread { min_us, max_us }
+    }
+
+    /// Always the same.
+    pub const fn fixed(us: u64) -> Spread {
+        Spread::new(us, us)
+    }
+
+    pub(super) fn draw(self, random: &mut Random) -> u64 {
+        random.integer(self.min_us, self.max_us)
+    }
+}
+
+/// 1000h and 1018h.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Identity {
+    /// 1000h.
+    pub device_type: u32,
+    /// 1018h:1.
+    pub vendor: u32,
+    /// 1018h:2.
+    pub product: u32,
+    /// 1018h:3.
+    pub revision: u32,
+    /// 1018h:4.
+    pub serial: u32,
+}
+
+impl Identity {
+    /// EPOS4 50/5 Compact, firmware 0170h.
+    pub const fn epos4(serial: u32) -> Identity {
+        Identity {
+            device_type: 0x0002_0192,
+            vendor: 0x0000_00FB,
+            product: 0x6150_0000,
+            revision: 0x0170_0000,
+            serial,
+        }
+    }
+}
+
+/// Serial numbers of the simulated drives start here.
+const FIRST_SERIAL: u32 = 0x2600_0000;
+/// Largest error of a drive's crystal, parts per million.
+const CLOCK_PPM: f64 = 100.0;
+
+/// Everything that describes one drive.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DriveConfig {
+    /// Its node-ID.
+    pub node: NodeId,
+    /// Seed of its noise and of every latency.
+    pub seed: u64,
+    /// Who it says it is.
+    pub identity: Identity,
+    /// Its clock is this many parts per million fast.
+    pub clock_ppm: f64,
+    /// bit/s.
+    pub bit_rate: u32,
+    /// When its supply comes on first.
+    pub power_on: Time,
+    /// From power-on or NMT reset to the boot-up frame, 0.2 .. 0.6 s.
+    pub boot: Spread,
+    /// From an SDO request to its answer, 0.2 .. 1.0 ms (field: up to 15 ms).
+    pub sdo_latency: Spread,
+    /// From SYNC to the request to send the TPDOs, 50 .. 250 us.
+    pub tpdo_delay: Spread,
+    /// How long it stays off the bus after bus-off.
+    pub bus_off_pause: Spread,
+    /// The velocity loop.
+    pub servo: ServoConfig,
+    /// Motor and load.
+    pub plant: PlantConfig,
+    /// What goes wrong, and when.
+    pub faults: Vec<DriveFault>,
+}
+
+impl DriveConfig {
+    /// Drive `node` of the machine that `seed` describes: clock, time constant,
+    /// inertia, friction and start position are drawn from it.
+    pub fn new(node: NodeId, seed: u64) -> DriveConfig {
+        let seed = seed.wrapping_mul(1 << 7).wrapping_add(u64::from(node.get()));
+        let mut draw = Random::new(seed, random::SPREAD);
+        DriveConfig {
+            node,
+            seed,
+            identity: Identity::epos4(FIRST_SERIAL + u32::from(node.get())),
+            clock_ppm: CLOCK_PPM * draw.symmetric(),
+            bit_rate: 1_000_000,
+            power_on: Time::ZERO,
+            boot: Spread::new(200_000, 600_000),
+            sdo_latency: Spread::new(200, 1000),
+            tpdo_delay: Spread::new(50, 250),
+            bus_off_pause: Spread::fixed(100_000),
+            servo: ServoConfig {
+                time_constant_s: draw.between(0.003, 0.010),
+                ..ServoConfig::default()
+            },
+            plant: PlantConfig {
+                inertia_ratio: draw.between(0.7, 1.3),
+                friction_permille: draw.between(20.0, 50.0),
+                start_position: draw.between(-50_000.0, 50_000.0).round(),
+                ..PlantConfig::default()
+            },
+            faults: Vec::new(),
+        }
+    }
+
+    /// The same drive with one more fault.
+    pub fn with(mut self, fault: DriveFault) -> DriveConfig {
+        self.faults.push(fault);
+        self
+    }
+}
+
+/// Something that is wrong with a drive. Several can be combined.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DriveFault {
+    /// It is another device than expected.
+    Identity(Identity),
+    /// Every SDO write to this entry is answered with this abort code.
+    RefuseWrite {
+        /// Index of the entry.
+        index: u16,
+        /// Sub-index of the entry.
+        sub: u8,
+        /// The abort code.
+        abort: u32,
+    },
+    /// Its SDO answers take this long.
+    SdoLatency(Spread),
+    /// From then on it answers no SDO request.
+    SdoDead {
+        /// Since when.
+        at: Time,
+    },
+    /// From then on its heartbeats are missing; everything else works.
+    HeartbeatLost {
+        /// Since when.
+        at: Time,
+    },
+    /// From then on its TPDOs are missing; everything else works.
+    TpdosLost {
+        /// Since when.
+        at: Time,
+    },
+    /// The supply fails: silence, and the motor coasts.
+    PowerLoss {
+        /// When.
+        at: Time,
+    },
+    /// The supply fails and comes back.
+    PowerCycle {
+        /// When it fails.
+        off: Time,
+        /// When it is back.
+        on: Time,
+    },
+    /// An error occurs in the drive: EMCY and reaction as its code has them.
+    Error {
+        /// When.
+        at: Time,
+        /// Its code: 2310h overcurrent, 8611h following error, FF01h warning.
+        code: u16,
+        /// Until when its cause lasts; before, a fault reset is in vain.
+        /// `None`: the cause is gone at once.
+        until: Option<Time>,
+    },
+}

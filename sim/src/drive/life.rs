@@ -1,0 +1,126 @@
+//! Power-on, resets and the way back (CiA 301, 7.3.2.2.1).
+
+use super::errors;
+use super::{Drive, Job};
+
+/// How far the drive is on its way from power-on to its services.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Life {
+    /// No supply.
+    Off,
+    /// Supply, but the software is still starting.
+    Starting,
+    /// NMT reset node came while the axis had torque: the drive brings it to
+    /// rest as 6007h says, then starts as from power-on. It is deaf meanwhile.
+    Resetting,
+    /// NMT reset communication: the axis goes on, the communication starts.
+    Restarting,
+    /// All services that the NMT state allows.
+    Running,
+}
+
+impl Drive {
+    pub(super) fn power_on(&mut self) {
+        if self.life == Life::Off {
+            self.start();
+        }
+    }
+
+    pub(super) fn power_off(&mut self) {
+        self.end_communication();
+        self.controller.reset();
+        self.axis.power_on_reset();
+        self.nmt.reset();
+        self.life = Life::Off;
+    }
+
+    /// From power-on, or after NMT reset node.
+    fn start(&mut self) {
+        self.end_communication();
+        self.controller.reset();
+        self.axis.power_on_reset();
+        self.od.reset_node();
+        self.nmt.reset();
+        self.life = Life::Starting;
+        self.plan_boot();
+    }
+
+    pub(super) fn reset_node(&mut self) {
+        self.end_communication();
+        self.axis.connection_ends(&self.od);
+        self.life = Life::Resetting;
+        self.finish_reset();
+    }
+
+    /// The second half of a reset: the axis has no torque any more.
+    pub(super) fn finish_reset(&mut self) {
+        if self.life == Life::Resetting && !self.axis.powered() {
+            self.start();
+        }
+    }
+
+    pub(super) fn reset_communication(&mut self) {
+        self.end_communication();
+        self.axis.connection_ends(&self.od);
+        self.od.reset_communication();
+        self.life = Life::Restarting;
+        self.plan_boot();
+    }
+
+    fn end_communication(&mut self) {
+        // Whatever was planned for the old life is void.
+        self.lives += 1;
+        self.bus_off = false;
+        self.controller.clear();
+        self.service.reset(&mut self.od);
+        self.exchange.clear();
+        self.watch.clear();
+        self.od.operational = false;
+    }
+
+    fn plan_boot(&mut self) {
+        let boot = self.config.boot.draw(&mut self.random);
+        self.plan(self.now + self.clock.span(boot), Job::Boot);
+    }
+
+    /// The boot-up message, then pre-operational.
+    pub(super) fn boot(&mut self) {
+        self.life = Life::Running;
+        if let Some(frame) = self.nmt.boot() {
+            self.transmit(frame);
+        }
+        self.start_watch();
+        self.exchange.reload(&self.od);
+    }
+
+    /// An error occurs, with its message and its reaction.
+    pub(super) fn raise(&mut self, code: u16, lasting: bool) {
+        if matches!(self.life, Life::Off | Life::Starting) {
+            return;
+        }
+        let new = if lasting {
+            self.od.errors.raise_lasting(code)
+        } else {
+            self.od.errors.raise(code)
+        };
+        if new {
+            self.axis.fault(errors::classify(code).1, &self.od);
+            self.send_emcy(code);
+        }
+    }
+
+    pub(super) fn cause_gone(&mut self, code: u16) {
+        self.od.errors.cause_gone(code);
+        let warning = errors::classify(code).1 == errors::Reaction::Warning;
+        if warning && self.od.errors.warning_gone(code) {
+            self.send_emcy(0);
+        }
+    }
+
+    /// 6040h was written.
+    pub(super) fn on_controlword(&mut self) {
+        if self.axis.control(&self.od) && self.od.errors.reset() {
+            self.send_emcy(0);
+        }
+    }
+}
