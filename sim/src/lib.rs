@@ -1,6 +1,7 @@
 //! Simulator.
 
 pub mod bus;
+pub mod drive;
 pub mod frame;
 pub mod judge;
 pub mod log;

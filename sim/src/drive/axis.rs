@@ -17,7 +17,7 @@ const REMOTE: u16 = 1 << 9;
 
 /// The axis.
 #[derive(Clone, Debug)]
-pub struct Axis {
+pub(super) struct Axis {
     machine: Machine,
     servo: Servo,
     modes: Modes,
@@ -31,7 +31,7 @@ pub struct Axis {
 
 impl Axis {
     /// Before power-on.
-    pub fn new(servo: Servo) -> Axis {
+    pub(super) fn new(servo: Servo) -> Axis {
         Axis {
             machine: Machine::new(),
             servo,
@@ -44,62 +44,62 @@ impl Axis {
     }
 
     /// The supply failed, or the drive starts anew: only the motor remembers.
-    pub fn power_on_reset(&mut self) {
+    pub(super) fn power_on_reset(&mut self) {
         self.machine = Machine::new();
         self.modes = Modes::default();
         self.mode_bits = 0;
     }
 
     /// What is true.
-    pub fn truth(&self) -> PlantState {
+    pub(super) fn truth(&self) -> PlantState {
         self.servo.truth()
     }
 
     /// State of CiA 402.
-    pub fn state(&self) -> State {
+    pub(super) fn state(&self) -> State {
         self.machine.state()
     }
 
     /// 6061h.
-    pub fn mode(&self) -> Mode {
+    pub(super) fn mode(&self) -> Mode {
         self.mode
     }
 
     /// Speed demand in rpm, 0 while the power stage is off.
-    pub fn demand(&self) -> f64 {
+    pub(super) fn demand(&self) -> f64 {
         self.demand
     }
 
     /// Whether the motor has torque.
-    pub fn powered(&self) -> bool {
+    pub(super) fn powered(&self) -> bool {
         self.machine.powered()
     }
 
     /// A controlword was written. True if a fault was reset.
-    pub fn control(&mut self, od: &Dictionary) -> bool {
+    pub(super) fn control(&mut self, od: &Dictionary) -> bool {
         let controlword = od.number(0x6040, 0) as u16;
         let may_reset = od.errors.may_reset();
         self.machine.control(controlword, options(od), may_reset)
     }
 
     /// An error occurred.
-    pub fn fault(&mut self, reaction: Reaction, od: &Dictionary) {
+    pub(super) fn fault(&mut self, reaction: Reaction, od: &Dictionary) {
         self.machine.fault(reaction, options(od));
     }
 
     /// NMT takes the drive out of operational.
-    pub fn connection_ends(&mut self, od: &Dictionary) {
+    pub(super) fn connection_ends(&mut self, od: &Dictionary) {
         self.machine.connection_ends(options(od));
     }
 
     /// One control cycle while the drive has no supply, or before it runs.
-    pub fn coast(&mut self, own_s: f64, true_s: f64) {
+    pub(super) fn coast(&mut self, own_s: f64, true_s: f64) {
         self.demand = 0.0;
         self.servo.step(None, Standstill::DEFAULT, own_s, true_s);
     }
 
     /// One control cycle; the measured values go into the dictionary.
-    pub fn cycle(&mut self, od: &mut Dictionary, own_s: f64, true_s: f64) {
+    pub(super) fn cycle(&mut self, od: &mut Dictionary, own_s: f64, true_s: f64) {
         let standstill = Standstill {
             speed_rpm: od.number(0x30E0, 1) as f64,
             window_s: od.number(0x30E0, 2) as f64 / 1000.0,
@@ -112,7 +112,8 @@ impl Axis {
         self.demand = demand.unwrap_or(0.0);
 
         let timeout_s = od.number(0x30E0, 3) as f64 / 1000.0;
-        if self.machine.cycle(self.at_rest(own_s, timeout_s)) {
+        let at_rest = self.at_rest(own_s, timeout_s);
+        if self.machine.cycle(at_rest) {
             // What was asked for during the ramp counts now.
             self.control(od);
         }
@@ -175,7 +176,7 @@ impl Axis {
     }
 
     /// Statusword; `remote` in NMT operational.
-    pub fn statusword(&self, remote: bool, warning: bool) -> u16 {
+    pub(super) fn statusword(&self, remote: bool, warning: bool) -> u16 {
         let state = self.machine.state();
         let mut word = state.statusword() | self.mode_bits;
         if state.voltage_enabled() {

@@ -218,8 +218,8 @@ impl Machine {
             }
             (OperationEnabled, DisableVoltage) => self.go(SwitchOnDisabled), // 9
             (SwitchedOn, DisableVoltage | QuickStop) => self.go(SwitchOnDisabled), // 10
-            (OperationEnabled, QuickStop) => self.go(QuickStopActive), // 11
-            (QuickStopActive, DisableVoltage) => self.go(SwitchOnDisabled), // 12
+            (OperationEnabled, QuickStop) => self.go(QuickStopActive),       // 11
+            (QuickStopActive, DisableVoltage) => self.go(SwitchOnDisabled),  // 12
             (QuickStopActive, EnableOperation) => self.go(OperationEnabled), // 16
             _ => {}
         }
@@ -452,7 +452,10 @@ mod tests {
     fn a_reset_needs_the_edge_and_the_cause_gone() {
         let mut m = machine(State::Fault);
         assert!(!m.control(0x80, OPTIONS, false));
-        assert!(!m.control(0x80, OPTIONS, true), "no edge: it was set before");
+        assert!(
+            !m.control(0x80, OPTIONS, true),
+            "no edge: it was set before"
+        );
         assert!(!m.control(0x00, OPTIONS, true));
         assert!(m.control(0x80, OPTIONS, true));
         assert_eq!(m.state(), State::SwitchOnDisabled);

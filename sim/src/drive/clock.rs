@@ -8,7 +8,7 @@ const CYCLE_US: u64 = 400;
 
 /// A clock that starts at power-on.
 #[derive(Clone, Copy, Debug)]
-pub struct Clock {
+pub(super) struct Clock {
     start: Time,
     /// Own time over true time.
     rate: f64,
@@ -16,7 +16,7 @@ pub struct Clock {
 
 impl Clock {
     /// A clock that is `ppm` parts per million fast.
-    pub fn new(start: Time, ppm: f64) -> Clock {
+    pub(super) fn new(start: Time, ppm: f64) -> Clock {
         Clock {
             start,
             rate: 1.0 + ppm * 1e-6,
@@ -24,28 +24,28 @@ impl Clock {
     }
 
     /// The true length of `us` own microseconds.
-    pub fn span(&self, us: u64) -> Time {
+    pub(super) fn span(&self, us: u64) -> Time {
         Time::from_ps((us as f64 * PS_PER_US as f64 / self.rate).round() as u64)
     }
 
     /// The moment by the own clock, as the library counts.
-    pub fn own(&self, at: Time) -> Instant {
+    pub(super) fn own(&self, at: Time) -> Instant {
         let us = at.since(self.start).as_us_f64() * self.rate;
         Instant::from_micros(us as u64)
     }
 
     /// When the own clock shows `instant`, never too early.
-    pub fn when(&self, instant: Instant) -> Time {
+    pub(super) fn when(&self, instant: Instant) -> Time {
         self.start + self.span(instant.as_micros() + 1)
     }
 
     /// The true length of a control cycle.
-    pub fn cycle(&self) -> Time {
+    pub(super) fn cycle(&self) -> Time {
         self.span(CYCLE_US)
     }
 
     /// The length of a control cycle in own seconds and in true ones.
-    pub fn cycle_seconds(&self) -> (f64, f64) {
+    pub(super) fn cycle_seconds(&self) -> (f64, f64) {
         let own = CYCLE_US as f64 * 1e-6;
         (own, self.cycle().as_ps() as f64 / PS_PER_S as f64)
     }

@@ -99,7 +99,9 @@ impl DriveConfig {
     /// Drive `node` of the machine that `seed` describes: clock, time constant,
     /// inertia, friction and start position are drawn from it.
     pub fn new(node: NodeId, seed: u64) -> DriveConfig {
-        let seed = seed.wrapping_mul(1 << 7).wrapping_add(u64::from(node.get()));
+        let seed = seed
+            .wrapping_mul(1 << 7)
+            .wrapping_add(u64::from(node.get()));
         let mut draw = Random::new(seed, random::SPREAD);
         DriveConfig {
             node,

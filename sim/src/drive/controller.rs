@@ -19,11 +19,11 @@ struct Waiting {
 
 /// The queue is full and the frame is lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct QueueFull;
+pub(super) struct QueueFull;
 
 /// The controller.
 #[derive(Clone, Debug)]
-pub struct Controller {
+pub(super) struct Controller {
     queue: Vec<Waiting>,
     in_flight: Option<u32>,
     next_tag: u32,
@@ -43,7 +43,7 @@ impl Default for Controller {
 
 impl Controller {
     /// Puts a frame in the queue, behind those with its identifier.
-    pub fn send(&mut self, frame: WireFrame, now: Time) -> Result<(), QueueFull> {
+    pub(super) fn send(&mut self, frame: WireFrame, now: Time) -> Result<(), QueueFull> {
         if self.queue.len() >= CAPACITY {
             return Err(QueueFull);
         }
@@ -58,7 +58,7 @@ impl Controller {
 
     /// The same for an object with a mailbox of its own: new data replaces data
     /// that still waits.
-    pub fn send_latest(&mut self, frame: WireFrame, now: Time) -> Result<(), QueueFull> {
+    pub(super) fn send_latest(&mut self, frame: WireFrame, now: Time) -> Result<(), QueueFull> {
         let in_flight = self.in_flight;
         let old = self
             .queue
@@ -74,24 +74,27 @@ impl Controller {
     }
 
     /// Everything that waits is forgotten.
-    pub fn clear(&mut self) {
+    pub(super) fn clear(&mut self) {
         self.queue.clear();
         self.in_flight = None;
     }
 
     /// A new start of the controller.
-    pub fn reset(&mut self) {
+    pub(super) fn reset(&mut self) {
         self.clear();
         self.state = ErrorState::Active;
     }
 
     /// What the bus would get next. Nothing while a frame is on the wire.
-    pub fn offer(&self) -> Option<Offer> {
+    pub(super) fn offer(&self) -> Option<Offer> {
         if self.in_flight.is_some() {
             return None;
         }
         // Equal identifiers keep their order: `min_by_key` takes the first.
-        let first = self.queue.iter().min_by_key(|w| w.frame.arbitration_key())?;
+        let first = self
+            .queue
+            .iter()
+            .min_by_key(|w| w.frame.arbitration_key())?;
         Some(Offer {
             frame: first.frame,
             ready_at: first.ready_at,
@@ -100,7 +103,7 @@ impl Controller {
     }
 
     /// Takes in what the bus says. A change of the error state is answered.
-    pub fn on_event(&mut self, kind: &EventKind) -> Option<ErrorState> {
+    pub(super) fn on_event(&mut self, kind: &EventKind) -> Option<ErrorState> {
         match *kind {
             EventKind::TxStarted { tag } => self.in_flight = Some(tag),
             EventKind::TxDone { tag, .. } => {
@@ -139,7 +142,12 @@ mod tests {
     #[test]
     fn the_lowest_identifier_goes_first_and_equal_ones_in_order() {
         let mut c = Controller::default();
-        for f in [frame(0x701, 5), frame(0x581, 1), frame(0x581, 2), frame(0x181, 3)] {
+        for f in [
+            frame(0x701, 5),
+            frame(0x581, 1),
+            frame(0x581, 2),
+            frame(0x181, 3),
+        ] {
             c.send(f, Time::ZERO).unwrap();
         }
         let mut seen = Vec::new();

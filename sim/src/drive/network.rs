@@ -61,8 +61,8 @@ impl Drive {
             self.transmit_latest(frame.into());
         }
         let consumers = self.watch.consumers.iter_mut();
-        let lost = consumers.filter(|c| c.1.poll(now).is_some()).count();
-        if lost > 0 {
+        let lost = consumers.fold(false, |lost, (_, c)| c.poll(now).is_some() || lost);
+        if lost {
             self.connection_lost(errors::HEARTBEAT);
         }
         self.poll_server();

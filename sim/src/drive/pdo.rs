@@ -20,15 +20,15 @@ const ID_MASK: u32 = 0x7FF;
 const PDO_BITS: u32 = 64;
 
 /// Transmission type: with every SYNC.
-pub const EVERY_SYNC: u8 = 1;
+pub(super) const EVERY_SYNC: u8 = 1;
 /// Transmission type: on remote request.
 const ON_REQUEST: u8 = 253;
 /// Transmission type: on change.
-pub const ON_CHANGE: u8 = 255;
+pub(super) const ON_CHANGE: u8 = 255;
 
 /// Which way, seen from the drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Direction {
+pub(super) enum Direction {
     /// RPDO.
     Receive,
     /// TPDO.
@@ -51,7 +51,7 @@ impl Direction {
     }
 
     /// Identifier of PDO `number` (from 0) in the predefined connection set.
-    pub fn default_id(self, number: u16, node: NodeId) -> u16 {
+    pub(super) fn default_id(self, number: u16, node: NodeId) -> u16 {
         use FunctionCode::*;
         let functions = match self {
             Direction::Receive => [Rpdo1, Rpdo2, Rpdo3, Rpdo4],
@@ -70,7 +70,7 @@ impl Direction {
 
 /// A PDO that exists, ready to pack and unpack.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Pdo {
+pub(super) struct Pdo {
     /// Its identifier.
     pub id: u16,
     /// Its transmission type.
@@ -88,7 +88,7 @@ pub struct Pdo {
 impl Pdo {
     /// PDO `number` (from 0) as the dictionary describes it; `None` if it does
     /// not exist or carries nothing.
-    pub fn read(od: &Dictionary, direction: Direction, number: u16) -> Option<Pdo> {
+    pub(super) fn read(od: &Dictionary, direction: Direction, number: u16) -> Option<Pdo> {
         let communication = direction.communication() + number;
         let mapping = direction.mapping() + number;
         let cob_id = od.number(communication, 1) as u32;
@@ -118,7 +118,7 @@ impl Pdo {
     }
 
     /// The data of a TPDO as the dictionary stands now.
-    pub fn pack(&self, od: &mut Dictionary) -> Vec<u8> {
+    pub(super) fn pack(&self, od: &mut Dictionary) -> Vec<u8> {
         let mut data = Vec::with_capacity(self.len);
         for &(at, len) in &self.entries {
             // Mapped entries exist: the mapping was checked when written.
@@ -129,7 +129,7 @@ impl Pdo {
     }
 
     /// Takes over the data of an RPDO, which is at least as long as mapped.
-    pub fn unpack(&self, data: &[u8], od: &mut Dictionary) {
+    pub(super) fn unpack(&self, data: &[u8], od: &mut Dictionary) {
         let mut rest = data;
         for &(at, len) in &self.entries {
             let Some((value, tail)) = rest.split_at_checked(len) else {
@@ -161,7 +161,12 @@ impl From<u32> for Mapped {
 ///
 /// # Errors
 /// The abort code of the drive.
-pub fn check(od: &Dictionary, node: NodeId, at: Address, number: u32) -> Result<(), AbortCode> {
+pub(super) fn check(
+    od: &Dictionary,
+    node: NodeId,
+    at: Address,
+    number: u32,
+) -> Result<(), AbortCode> {
     let index = at.index.0;
     for direction in [Direction::Receive, Direction::Transmit] {
         let communication = direction.communication();

@@ -13,7 +13,7 @@ pub struct Slopes {
 /// The demand after `seconds`, coming from `demand` and going to `target`
 /// (rpm). A change of sign slows down to zero with the deceleration first and
 /// speeds up with the acceleration in what is left of the step.
-pub fn step(demand: f64, target: f64, slopes: Slopes, seconds: f64) -> f64 {
+pub(super) fn step(demand: f64, target: f64, slopes: Slopes, seconds: f64) -> f64 {
     let slowing = demand * target < 0.0 || demand.abs() > target.abs();
     if !slowing {
         return toward(demand, target, slopes.acceleration * seconds);

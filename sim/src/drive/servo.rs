@@ -219,7 +219,10 @@ mod tests {
         for tau in [0.003, 0.005, 0.010] {
             for ratio in [0.7, 1.0, 1.3] {
                 let seen = rise(&mut servo(tau, ratio, 35.0, 3));
-                assert!((0.6 * tau..1.6 * tau).contains(&seen), "{tau} {ratio}: {seen}");
+                assert!(
+                    (0.6 * tau..1.6 * tau).contains(&seen),
+                    "{tau} {ratio}: {seen}"
+                );
             }
         }
     }
