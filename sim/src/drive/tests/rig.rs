@@ -120,7 +120,7 @@ impl Rig {
         };
         let (tag, sof) = (offer.tag, self.now);
         self.event(drive, EventKind::TxStarted { tag });
-        self.now = self.now + FRAME_TIME;
+        self.now += FRAME_TIME;
         self.event(drive, EventKind::TxDone { tag, sof });
         let frame = Frame::try_from(offer.frame).unwrap();
         self.log.push((self.now, frame));
