@@ -122,13 +122,13 @@ impl PositionControl {
             } else {
                 self.tuning.correction_rpm
             };
-            correction = self.scale.rpm(self.gain * error).clamp(-bound, bound);
+            correction = within(self.scale.rpm(self.gain * error), -bound, bound);
         }
         let advanced = window.ahead.velocity + self.lag * (window.beyond - window.ahead.velocity);
         let wanted = self.scale.rpm(advanced) + correction + self.carry;
         let limit = limit as f32;
-        let command = round(wanted.clamp(-limit, limit));
-        self.carry = (wanted - command as f32).clamp(-1.0, 1.0);
+        let command = round(within(wanted, -limit, limit));
+        self.carry = within(wanted - command as f32, -1.0, 1.0);
         command
     }
 
@@ -139,11 +139,144 @@ impl PositionControl {
             return;
         }
         let missing = error * self.gain / acceleration;
-        self.lag = (self.lag + self.tuning.learning * missing).clamp(0.0, self.lag_max);
+        self.lag = within(self.lag + self.tuning.learning * missing, 0.0, self.lag_max);
+    }
+}
+
+/// The number of `low ..= high` that is nearest to `x`. Unlike `f32::clamp` it
+/// has no panic, whose message would bring the formatting of floating-point
+/// numbers into the image.
+fn within(x: f32, low: f32, high: f32) -> f32 {
+    if x < low {
+        low
+    } else if x > high {
+        high
+    } else {
+        x
     }
 }
 
 /// To the nearest whole number, halves away from zero.
 fn round(x: f32) -> i32 {
     (x + 0.5f32.copysign(x)) as i32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::time::Duration;
+
+    /// Increments per cycle that are 1 rpm with 2000 increments and 10 ms.
+    const RPM: f32 = 1.0 / 3.0;
+
+    fn control() -> PositionControl {
+        let scale = Scale::new(2000, Duration::from_millis(10));
+        PositionControl::new(scale, Tuning::MILLISECONDS_10)
+    }
+
+    fn resting(position: i32) -> Window {
+        Window {
+            now: Setpoint::at_rest(position),
+            ahead: Setpoint::at_rest(position),
+            beyond: 0.0,
+        }
+    }
+
+    fn cruising(rpm: f32) -> Window {
+        let at = Setpoint {
+            velocity: rpm * RPM,
+            ..Setpoint::at_rest(0)
+        };
+        Window {
+            now: at,
+            ahead: at,
+            beyond: at.velocity,
+        }
+    }
+
+    #[test]
+    fn a_resting_axis_inside_the_dead_band_gets_nothing() {
+        let mut control = control();
+        for error in [-1, 0, 1] {
+            assert_eq!(control.step(&resting(100), Some(100 - error), 3000), 0);
+        }
+    }
+
+    #[test]
+    fn creeping_is_slower_than_what_counts_as_motion() {
+        for error in [-1000, -20, 20, 1000] {
+            let mut control = control();
+            for _ in 0..10 {
+                let rpm = control.step(&resting(0), Some(-error), 3000);
+                assert!(rpm.abs() <= 3 && rpm * error > 0, "{rpm}");
+            }
+        }
+    }
+
+    /// Two increments of error are 0.72 rpm: 72 of 100 cycles at 1 rpm.
+    #[test]
+    fn rounding_is_carried_on() {
+        let mut control = control();
+        let sum: i32 = (0..100)
+            .map(|_| control.step(&resting(2), Some(0), 3000))
+            .sum();
+        assert_eq!(sum, 72);
+    }
+
+    #[test]
+    fn the_wrap_of_the_position_is_no_error() {
+        let mut control = control();
+        let window = resting(i32::MIN);
+        assert_eq!(control.step(&window, Some(i32::MAX), 3000), 0);
+    }
+
+    #[test]
+    fn commands_keep_their_limits() {
+        let mut control = control();
+        assert_eq!(control.step(&cruising(5000.0), Some(0), 3000), 3000);
+        assert_eq!(control.step(&cruising(-5000.0), Some(0), 3000), -3000);
+        // The correction is bounded as well.
+        let mut control = super::tests::control();
+        let rpm = control.step(&cruising(1000.0), Some(-100_000), 3000);
+        assert_eq!(rpm, 1060);
+    }
+
+    #[test]
+    fn without_feedback_the_feed_forward_goes_on() {
+        let mut control = control();
+        for _ in 0..10 {
+            assert_eq!(control.step(&cruising(750.0), None, 3000), 750);
+        }
+    }
+
+    /// A drive whose lag is 4 ms longer than assumed is late by 4 ms times the
+    /// acceleration, less the share already learned.
+    #[test]
+    fn the_lag_is_learned_and_bounded() {
+        let mut control = control();
+        let acceleration = 3.0;
+        let at = Setpoint {
+            acceleration,
+            velocity: 100.0,
+            ..Setpoint::at_rest(0)
+        };
+        let window = Window {
+            now: at,
+            ahead: at,
+            beyond: 103.0,
+        };
+        for _ in 0..300 {
+            let late = (0.9 - control.lag()) * acceleration / control.gain;
+            control.step(&window, Some(-round(late)), 3000);
+        }
+        assert!((control.lag() - 0.9).abs() < 0.03, "{}", control.lag());
+        for _ in 0..1000 {
+            control.step(&window, Some(-100_000), 3000);
+        }
+        assert_eq!(control.lag(), control.lag_max);
+        for _ in 0..1000 {
+            control.step(&window, Some(100_000), 3000);
+        }
+        assert_eq!(control.lag(), 0.0);
+    }
 }

@@ -35,6 +35,10 @@ use crate::time::Instant;
 /// one of six axes fails.
 const EVENTS: usize = 24;
 
+/// Where the count of cycles stands still: far behind the end of any reference,
+/// and far before the end of its type.
+const LONGEST_T: i32 = i32::MAX / 2;
+
 /// What a drive reported in this cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -143,7 +147,7 @@ impl<const N: usize> Group<N> {
         out: &mut [AxisCommand; N],
     ) {
         self.now += self.config.cycle;
-        self.t = self.t.saturating_add(1);
+        self.t = (self.t + 1).min(LONGEST_T);
         for n in 0..N {
             self.hear(n, feedback);
         }
