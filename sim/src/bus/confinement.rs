@@ -3,7 +3,7 @@
 
 use super::types::{ErrorState, EventKind};
 
-/// From here on a node warns (12.1.4.4).
+/// From here on a node warns (12.1.4).
 const WARNING_LIMIT: u16 = 96;
 /// A counter above this makes a node error passive.
 const PASSIVE_LIMIT: u16 = 127;

@@ -1,5 +1,5 @@
 //! One node's protocol controller: what it does at each of its sample points
-//! (ISO 11898-1:2015, 10.4, 10.9 to 10.12 and 12.1).
+//! (ISO 11898-1:2015, 10.4 to 10.11).
 
 use super::confinement::Counters;
 use super::decoder::{Decoder, Progress};
@@ -14,12 +14,7 @@ pub(super) const DOMINANT: bool = false;
 const INTEGRATION_BITS: u32 = 11;
 /// Such sequences that end bus-off.
 const BUS_OFF_SEQUENCES: u32 = 129;
-const FLAG_BITS: u32 = 6;
-const DELIMITER_BITS: u32 = 8;
-const INTERMISSION_BITS: u32 = 3;
 const SUSPEND_BITS: u32 = 8;
-/// A bus that stays dominant this long after a flag costs again.
-const DOMINANT_RUN: u32 = 8;
 
 // The part of a frame behind the CRC sequence, by bit.
 const CRC_DELIMITER: u32 = 0;
@@ -75,9 +70,9 @@ pub(super) enum Mac {
 
 /// The frame that a node is sending.
 #[derive(Clone, Copy, Debug)]
-struct Tx {
+pub(super) struct Tx {
     frame: WireFrame,
-    tag: u32,
+    pub(super) tag: u32,
     bits: BitString,
     /// The bit on the wire now.
     index: u32,
@@ -94,7 +89,7 @@ pub(super) struct Io<'a> {
 }
 
 impl Io<'_> {
-    fn emit(&mut self, kind: EventKind) {
+    pub(super) fn emit(&mut self, kind: EventKind) {
         self.out.push(Event {
             at: Time(self.now),
             port: self.port,
@@ -110,11 +105,11 @@ pub(super) struct Controller {
     /// What it puts on the bus in the bit that runs now.
     pub(super) drive: bool,
     /// What it puts there in the next bit.
-    next_drive: bool,
-    tx: Option<Tx>,
+    pub(super) next_drive: bool,
+    pub(super) tx: Option<Tx>,
     /// It sent (or sends) the frame that the bus is busy with.
-    transmitter: bool,
-    rx: Decoder,
+    pub(super) transmitter: bool,
+    pub(super) rx: Decoder,
     sof: u64,
 }
 
@@ -180,7 +175,7 @@ impl Controller {
         self.mac = Mac::Integrating { run: 0, left };
     }
 
-    /// Whether a recessive to dominant edge restarts its bit (11.3.2.2: bus
+    /// Whether a recessive to dominant edge restarts its bit (11.3.2: bus
     /// integration, idle, suspend, and all of the intermission but its first
     /// bit).
     pub(super) fn takes_hard_sync(&self) -> bool {
@@ -207,7 +202,7 @@ impl Controller {
     }
 
     /// Latches the offered frame, if there is one ready.
-    fn take_offer(&mut self, io: &mut Io, sof: u64) -> bool {
+    pub(super) fn take_offer(&mut self, io: &mut Io, sof: u64) -> bool {
         let Some(offer) = io.offer.take_if(|offer| offer.ready_at.0 <= io.now) else {
             return false;
         };
@@ -269,7 +264,7 @@ impl Controller {
     }
 
     /// The sampled bit was another node's SOF.
-    fn start_of_frame(&mut self, io: &mut Io) {
+    pub(super) fn start_of_frame(&mut self, io: &mut Io) {
         self.transmitter = false;
         self.tx = None;
         self.sof = io.bit_start;
@@ -309,7 +304,7 @@ impl Controller {
         self.next_bit();
     }
 
-    fn next_bit(&mut self) {
+    pub(super) fn next_bit(&mut self) {
         if let Some(tx) = &mut self.tx {
             tx.index += 1;
             self.next_drive = tx.bits.get(tx.index);
@@ -350,143 +345,6 @@ impl Controller {
                     sof: Time(self.sof),
                 });
             }
-        }
-    }
-
-    /// An error: counts, tells, and sends the flag that the error state
-    /// before this error allows (12.1.4.2: the error that makes a node passive
-    /// is still flagged actively).
-    fn fail(&mut self, error: WireError, io: &mut Io) {
-        let passive = self.counters.is_passive();
-        let ack = passive && error == WireError::Ack;
-        // Rule c, exceptions: a passive transmitter without acknowledgement
-        // counts only if someone disturbs its flag, and a recessive stuff bit
-        // overwritten during arbitration does not count.
-        let exempt = ack || error == WireError::Stuff;
-        if !self.transmitter {
-            self.counters.receive_error();
-            io.emit(EventKind::RxError { error });
-        } else if !exempt {
-            self.counters.transmit_error();
-        }
-        if let Some(tx) = self.tx.take() {
-            io.emit(EventKind::TxError { tag: tx.tag, error });
-        }
-        if passive {
-            self.mac = Mac::PassiveFlag {
-                last: RECESSIVE,
-                run: 0,
-                ack,
-            };
-        } else {
-            self.mac = Mac::Flag {
-                sent: 0,
-                overload: false,
-            };
-            self.next_drive = DOMINANT;
-        }
-    }
-
-    fn overload(&mut self) {
-        self.mac = Mac::Flag {
-            sent: 0,
-            overload: true,
-        };
-        self.next_drive = DOMINANT;
-    }
-
-    /// Counts an error that the standard weighs with 8, whatever the role.
-    fn heavy_error(&mut self) {
-        if self.transmitter {
-            self.counters.transmit_error();
-        } else {
-            self.counters.receive_error_heavy();
-        }
-    }
-
-    fn flag(&mut self, sent: u32, overload: bool, level: bool) {
-        if level == RECESSIVE {
-            self.heavy_error(); // Rules d and e.
-        }
-        let sent = sent + 1;
-        if sent == FLAG_BITS {
-            self.mac = Mac::FlagOver {
-                dominant: 0,
-                overload,
-            };
-        } else {
-            self.mac = Mac::Flag { sent, overload };
-            self.next_drive = DOMINANT;
-        }
-    }
-
-    fn passive_flag(&mut self, last: bool, run: u32, ack: bool, level: bool) {
-        if ack && level == DOMINANT {
-            self.counters.transmit_error();
-        }
-        let ack = ack && level == RECESSIVE;
-        let run = if level == last { run + 1 } else { 1 };
-        self.mac = if run == FLAG_BITS {
-            Mac::FlagOver {
-                dominant: 0,
-                overload: false,
-            }
-        } else {
-            Mac::PassiveFlag {
-                last: level,
-                run,
-                ack,
-            }
-        };
-    }
-
-    fn flag_over(&mut self, dominant: u32, overload: bool, level: bool) {
-        if level == RECESSIVE {
-            self.mac = Mac::Delimiter { seen: 1 };
-            return;
-        }
-        let dominant = dominant + 1;
-        if dominant == 1 && !overload && !self.transmitter {
-            self.counters.receive_error_heavy(); // Rule b.
-        }
-        if dominant.is_multiple_of(DOMINANT_RUN) {
-            self.heavy_error(); // Rule f.
-        }
-        self.mac = Mac::FlagOver { dominant, overload };
-    }
-
-    fn delimiter(&mut self, seen: u32, level: bool, io: &mut Io) {
-        let seen = seen + 1;
-        match (level, seen) {
-            (DOMINANT, DELIMITER_BITS) => self.overload(),
-            (DOMINANT, _) => self.fail(WireError::Form, io),
-            (RECESSIVE, DELIMITER_BITS) => self.mac = Mac::Intermission(1),
-            (RECESSIVE, _) => self.mac = Mac::Delimiter { seen },
-        }
-    }
-
-    fn intermission(&mut self, bit: u32, level: bool, io: &mut Io) {
-        let suspends = self.transmitter && self.counters.is_passive();
-        match (level, bit) {
-            // 10.4.6.2: a dominant third bit is a start of frame, which whoever
-            // waits joins with its identifier.
-            (DOMINANT, INTERMISSION_BITS) => {
-                let joins = !suspends && self.take_offer(io, io.bit_start);
-                if joins {
-                    self.rx = Decoder::new();
-                    self.rx.push(DOMINANT);
-                    self.mac = Mac::Stuffed;
-                    self.next_bit();
-                } else {
-                    self.start_of_frame(io);
-                }
-            }
-            (DOMINANT, _) => self.overload(),
-            (RECESSIVE, INTERMISSION_BITS) => {
-                self.transmitter = false;
-                self.mac = if suspends { Mac::Suspend(1) } else { Mac::Idle };
-            }
-            (RECESSIVE, _) => self.mac = Mac::Intermission(bit + 1),
         }
     }
 }

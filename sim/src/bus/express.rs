@@ -283,16 +283,28 @@ impl Bus {
             node.offer = offer;
         }
         // Each node has been told a beginning of the same sequence.
-        let mut told = vec![0usize; self.nodes.len()];
         for event in &plan.events[..plan.told] {
-            told[event.port.0] += 1;
-        }
-        for event in again {
-            match told[event.port.0] {
-                0 => self.unheard.push(event),
-                _ => told[event.port.0] -= 1,
-            }
+            self.repeats[event.port.0] += 1;
         }
         self.plan = plan;
+        self.drop_repeats(0, &mut again);
+        self.unheard.append(&mut again);
+    }
+
+    /// Takes what has been told before out of `events`, from `first` on.
+    pub(super) fn drop_repeats(&mut self, first: usize, events: &mut Vec<Event>) {
+        if self.repeats.iter().all(|n| *n == 0) {
+            return;
+        }
+        let mut index = 0;
+        events.retain(|event| {
+            index += 1;
+            let repeats = &mut self.repeats[event.port.0];
+            if index <= first || *repeats == 0 {
+                return true;
+            }
+            *repeats -= 1;
+            false
+        });
     }
 }

@@ -91,7 +91,9 @@ impl Faults {
                     bit,
                 };
                 noise.draw(&mut self.rng);
-                self.noise.push(noise);
+                if noise.next < noise.until {
+                    self.noise.push(noise);
+                }
             }
         }
     }
@@ -109,7 +111,7 @@ impl Faults {
     /// Begins and ends what is due.
     pub(super) fn apply(&mut self, now: u64) {
         for noise in &mut self.noise {
-            while noise.next <= now {
+            while noise.next <= now && noise.next < noise.until {
                 self.windows.push(Window {
                     from: noise.next,
                     until: noise.next + noise.bit,

@@ -26,6 +26,7 @@ mod faults;
 pub mod log;
 mod node;
 mod record;
+mod signalling;
 mod types;
 mod wire;
 
@@ -63,6 +64,9 @@ pub struct Bus {
     recorder: Recorder,
     /// Events that came up outside of [`Bus::advance`].
     unheard: Vec<Event>,
+    /// How many of each node's next events have been told already, by a frame
+    /// that was planned as undisturbed and then was not.
+    repeats: Vec<usize>,
     /// Whether undisturbed frames are computed as a whole.
     express: bool,
 }
@@ -78,6 +82,7 @@ impl Bus {
             faults: Faults::new(seed),
             recorder: Recorder::default(),
             unheard: Vec::new(),
+            repeats: Vec::new(),
             express: true,
         }
     }
@@ -91,6 +96,7 @@ impl Bus {
     /// Wires a node to the bus. It takes no part until it has a timing.
     pub fn attach(&mut self, name: &str) -> PortId {
         self.nodes.push(Node::new(name));
+        self.repeats.push(0);
         PortId(self.nodes.len() - 1)
     }
 
@@ -127,6 +133,7 @@ impl Bus {
         self.interrupt(now);
         let now = self.now;
         self.nodes[port.0].set_timing(timing, now);
+        self.repeats[port.0] = 0;
         let mut out = std::mem::take(&mut self.unheard);
         self.refresh(now, &mut out);
         self.unheard = out;
@@ -216,10 +223,13 @@ impl Bus {
                     }
                 }
                 Mode::Bitwise => {
+                    let told = out.len();
                     self.run_bitwise(to, out);
+                    self.drop_repeats(told, out);
                     if self.mode == Mode::Bitwise {
                         return;
                     }
+                    self.repeats.fill(0);
                 }
             }
         }

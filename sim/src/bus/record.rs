@@ -21,10 +21,13 @@ struct Open {
 pub(super) struct Recorder {
     finished: Vec<WireRecord>,
     open: Option<Open>,
+    /// Where the last finished one ends.
+    end: Time,
 }
 
 impl Recorder {
     pub(super) fn push(&mut self, record: WireRecord) {
+        self.end = record.end;
         self.finished.push(record);
     }
 
@@ -81,7 +84,9 @@ impl Recorder {
             }
             None if flags => {
                 self.open = Some(Open {
-                    sof,
+                    // A stranger to the bit rate may believe itself in a frame
+                    // since before the last one.
+                    sof: sof.max(self.end.0),
                     lead: port,
                     transmitters: Vec::new(),
                     frame: None,
@@ -133,7 +138,7 @@ impl Recorder {
             },
         };
         let end = end.max(open.sof);
-        self.finished.push(WireRecord {
+        self.push(WireRecord {
             sof: Time(open.sof),
             end: Time(end),
             bits: ((end - open.sof + bit / 2) / bit.max(1)) as u32,

@@ -4,6 +4,7 @@ use super::*;
 use crate::frame::{WireFrame, WireId};
 use std::collections::VecDeque;
 
+mod anything;
 mod arbitration;
 mod errors;
 mod faults;
