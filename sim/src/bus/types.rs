@@ -63,7 +63,8 @@ pub enum EventKind {
         /// Of the offer.
         tag: u32,
     },
-    /// The frame was acknowledged and its end of frame was undisturbed.
+    /// The frame was acknowledged and its end of frame was undisturbed: at the
+    /// sample point of its last bit, before the intermission.
     TxDone {
         /// Of the offer.
         tag: u32,
@@ -88,8 +89,8 @@ pub enum EventKind {
         /// What this receiver saw.
         error: WireError,
     },
-    /// A frame arrived: valid at the last but one bit of its end of frame. Not
-    /// for its sender.
+    /// A frame arrived: at the sample point of the last but one bit of its end
+    /// of frame, from which on it is valid. Not for its sender.
     Rx {
         /// The frame.
         frame: WireFrame,
