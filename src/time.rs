@@ -80,6 +80,11 @@ impl Duration {
         self.0
     }
 
+    /// Half of it, rounded down.
+    pub const fn half(self) -> Duration {
+        Duration(self.0 / 2)
+    }
+
     /// Whole milliseconds, rounded down.
     pub const fn as_millis(self) -> u32 {
         self.0 / 1000

@@ -1,18 +1,25 @@
 //! Service data objects: reading and writing single entries of an object
 //! dictionary, confirmed by the other side (CiA 301, 7.2.4).
 //!
-//! [`Server`] and [`Client`] are sans-IO: a frame and the time go in, a frame
-//! comes out. Neither ever waits.
+//! [`Server`], [`Channel`] and [`Client`] are sans-IO: a frame and the time go
+//! in, a frame comes out. None of them ever waits.
 
 pub mod abort;
-pub mod client;
+mod block;
+mod channel;
+mod client;
 pub mod command;
+mod crc;
 mod error;
+mod progress;
 mod response;
-pub mod server;
+mod server;
 
 pub use abort::AbortCode;
-pub use client::{Client, Progress, StartError};
+pub use channel::{Channel, Payload, Protocol, Transfer};
+pub use client::Client;
+pub use crc::Crc16;
 pub use error::SdoError;
+pub use progress::{Progress, StartError};
 pub use response::{RESPONSE_MAX, Response};
 pub use server::Server;

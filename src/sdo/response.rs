@@ -39,7 +39,7 @@ impl Response {
         }
     }
 
-    /// The bytes read; nothing after a download.
+    /// The bytes read or written.
     pub fn data(&self) -> &[u8] {
         self.data.get(..usize::from(self.len)).unwrap_or(&[])
     }

@@ -53,7 +53,7 @@ fn expedited_download() {
     );
     assert_eq!(
         done(c.on_frame(&response([0x60, 0x17, 0x10, 0, 0, 0, 0, 0]), ms(1))),
-        b""
+        [50, 0]
     );
 }
 
@@ -90,7 +90,7 @@ fn segmented_download() {
     assert_eq!(progress, Progress::Send(request(*b"\x1Bhi\0\0\0\0\0")));
     assert_eq!(
         done(c.on_frame(&response([0x30, 0, 0, 0, 0, 0, 0, 0]), ms(1))),
-        b""
+        b"abcdefghi"
     );
 }
 

@@ -4,7 +4,7 @@ use canmaster::id::{Address, CobId};
 use canmaster::od::{
     Chunk, DataType, Entry, Object, ObjectDictionary, Part, Table, Value, Values, read_bytes,
 };
-use canmaster::sdo::AbortCode;
+use canmaster::sdo::{AbortCode, Payload};
 use canmaster::time::{Duration, Instant};
 use canmaster::{Frame, NodeId};
 
@@ -95,4 +95,41 @@ pub(crate) fn response(bytes: [u8; 8]) -> Frame {
 
 pub(crate) fn ms(ms: u64) -> Instant {
     Instant::from_micros(ms * 1000)
+}
+
+/// Data as the caller holds it.
+#[derive(Default)]
+pub(crate) struct Memory {
+    pub(crate) data: Vec<u8>,
+    pub(crate) limit: Option<u32>,
+}
+
+impl Memory {
+    pub(crate) fn of(data: &[u8]) -> Memory {
+        Memory {
+            data: data.to_vec(),
+            limit: None,
+        }
+    }
+}
+
+impl Payload for Memory {
+    fn read(&mut self, offset: u32, buf: &mut [u8]) {
+        let from = offset as usize;
+        buf.copy_from_slice(&self.data[from..from + buf.len()]);
+    }
+
+    fn begin(&mut self, size: Option<u32>) -> Result<(), AbortCode> {
+        self.data.clear();
+        match (size, self.limit) {
+            (Some(size), Some(limit)) if size > limit => Err(AbortCode::OUT_OF_MEMORY),
+            _ => Ok(()),
+        }
+    }
+
+    fn write(&mut self, offset: u32, data: &[u8]) -> Result<(), AbortCode> {
+        assert_eq!(offset as usize, self.data.len());
+        self.data.extend_from_slice(data);
+        Ok(())
+    }
 }

@@ -6,10 +6,13 @@
 //! it, because that client has given up the old one; a transfer that stands
 //! still is aborted with 05040000h.
 
+mod block;
+mod segmented;
 mod transfer;
 
 use super::abort::AbortCode;
-use super::command::{Answer, Bytes, EXPEDITED_MAX, Initiate, Request, SEGMENT_MAX, Segment};
+use super::block::{Receiver, Sender};
+use super::command::{Answer, BLOCK_MAX, Bytes, Request};
 use crate::frame::Frame;
 use crate::id::{Address, CobId, FunctionCode, NodeId};
 use crate::od::ObjectDictionary;
@@ -25,6 +28,8 @@ pub struct Server {
     request: CobId,
     response: CobId,
     timeout: Duration,
+    /// Segments per block that this server takes; 0: no block transfer.
+    block_size: u8,
     deadline: Instant,
     state: State,
 }
@@ -41,10 +46,30 @@ enum State {
         toggle: bool,
         offset: u32,
     },
+    BlockDownload {
+        sink: Sink,
+        receiver: Receiver,
+    },
+    BlockUpload {
+        source: Source,
+        sender: Sender,
+        phase: Phase,
+    },
+}
+
+/// What a block upload waits for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    /// The client's start command.
+    Start,
+    /// Segments to be sent, or their acknowledgement.
+    Segments,
+    /// The client's end command.
+    End,
 }
 
 /// What the client is told, or nothing.
-type Reply = Result<Option<Answer>, (Address, AbortCode)>;
+type Reply = Result<Option<Answer>, AbortCode>;
 
 impl Server {
     /// The default server of `node`: requests on 600h + node-ID, answers on
@@ -54,9 +79,22 @@ impl Server {
             request: CobId::of(FunctionCode::SdoRequest, node),
             response: CobId::of(FunctionCode::SdoResponse, node),
             timeout,
+            block_size: BLOCK_MAX,
             deadline: Instant::ZERO,
             state: State::Idle,
         }
+    }
+
+    /// The same with `block_size` segments per block of a block download, at
+    /// most 127; 0 refuses block transfers with 05040001h, as devices without
+    /// them do.
+    pub const fn with_block_size(self, block_size: u8) -> Server {
+        let block_size = if block_size > BLOCK_MAX {
+            BLOCK_MAX
+        } else {
+            block_size
+        };
+        Server { block_size, ..self }
     }
 
     /// The identifier that requests arrive on.
@@ -72,13 +110,14 @@ impl Server {
     /// Ends any transfer without a word: NMT reset, or the service is no
     /// longer allowed.
     pub fn reset(&mut self, od: &mut impl ObjectDictionary) {
-        if let State::Download { sink, .. } = &self.state {
+        if let State::Download { sink, .. } | State::BlockDownload { sink, .. } = &self.state {
             sink.cancel(od);
         }
         self.state = State::Idle;
     }
 
-    /// When [`poll`](Server::poll) has something to do.
+    /// When [`poll`](Server::poll) has something to do. In the middle of a
+    /// block upload that is at once, as soon as there is room for a frame.
     pub const fn next_deadline(&self) -> Option<Instant> {
         match self.state {
             State::Idle => None,
@@ -86,17 +125,20 @@ impl Server {
         }
     }
 
-    /// Lets time pass. To be called until it returns `None`.
+    /// Lets time pass: sends the segments of a block upload one by one, and
+    /// notices transfers that stand still. To be called until it returns
+    /// `None`, or until there is no room for another frame.
     pub fn poll(&mut self, now: Instant, od: &mut impl ObjectDictionary) -> Option<Frame> {
         let at = self.address()?;
         if now < self.deadline {
             return None;
         }
-        self.reset(od);
-        Some(self.frame(Answer::Abort {
-            at,
-            code: AbortCode::TIMEOUT,
-        }))
+        let bytes = match self.block_poll(now, od) {
+            Ok(Some(bytes)) => bytes,
+            Ok(None) => self.abort(at, AbortCode::TIMEOUT, od),
+            Err(code) => self.abort(at, code, od),
+        };
+        Some(Frame::full(self.response, bytes))
     }
 
     /// Serves a frame. Frames for others and frames without eight bytes are
@@ -111,171 +153,67 @@ impl Server {
             return None;
         }
         let bytes = frame.padded();
-        let reply = self.serve(bytes, od);
-        self.deadline = now + self.timeout;
-        match reply {
-            Ok(answer) => answer.map(|answer| self.frame(answer)),
-            Err((at, code)) => {
-                self.reset(od);
-                Some(self.frame(Answer::Abort { at, code }))
+        let mut at = self.address();
+        let reply = match self.block_segment(bytes, od) {
+            Some(reply) => reply,
+            None => {
+                // An initiate names its entry; everything else belongs to the
+                // transfer that is under way.
+                at = match Request::decode(bytes) {
+                    Some(request) => request.address().or(at),
+                    None => at.or(Some(super::command::address(bytes))),
+                };
+                self.serve(bytes, od)
             }
-        }
+        };
+        self.deadline = now + self.patience();
+        let bytes = match reply {
+            Ok(answer) => answer?.encode(),
+            Err(code) => self.abort(at.unwrap_or(NOWHERE), code, od),
+        };
+        Some(Frame::full(self.response, bytes))
     }
 
     fn serve(&mut self, bytes: Bytes, od: &mut impl ObjectDictionary) -> Reply {
-        let here = self.address();
-        let unknown = (
-            here.unwrap_or(super::command::address(bytes)),
-            AbortCode::COMMAND,
-        );
-        match Request::decode(bytes).ok_or(unknown)? {
-            Request::Download { at, data } => {
-                self.reset(od);
-                self.download(at, data, od).map_err(|code| (at, code))
-            }
-            Request::Upload { at } => {
-                self.reset(od);
-                self.upload(at, od).map_err(|code| (at, code))
-            }
-            Request::DownloadSegment(segment) => self
-                .download_segment(segment, od)
-                .map_err(|code| (here.unwrap_or(NOWHERE), code)),
-            Request::UploadSegment { toggle } => self
-                .upload_segment(toggle, od)
-                .map_err(|code| (here.unwrap_or(NOWHERE), code)),
-            Request::Abort { .. } => {
-                self.reset(od);
-                Ok(None)
-            }
-            Request::BlockDownload { at, .. } | Request::BlockUpload { at, .. } => {
-                Err((at, AbortCode::COMMAND))
-            }
-            _ => Err((here.unwrap_or(NOWHERE), AbortCode::COMMAND)),
+        let request = Request::decode(bytes).ok_or(AbortCode::COMMAND)?;
+        if request.address().is_some() {
+            // An initiate, or an abort: the transfer under way is over.
+            self.reset(od);
+        }
+        match request {
+            Request::Download { at, data } => self.download(at, data, od),
+            Request::Upload { at } => self.upload(at, od),
+            Request::DownloadSegment(segment) => self.download_segment(segment, od),
+            Request::UploadSegment { toggle } => self.upload_segment(toggle, od),
+            Request::Abort { .. } => Ok(None),
+            request => self.serve_block(request, od),
         }
     }
 
-    /// CiA 301, 7.2.4.3.3.
-    fn download(
-        &mut self,
-        at: Address,
-        data: Initiate,
-        od: &mut impl ObjectDictionary,
-    ) -> Result<Option<Answer>, AbortCode> {
-        match data {
-            Initiate::Expedited { data, len } => {
-                let mut sink = Sink::open(od, at, len.map(u32::from))?;
-                // Without a length the type decides.
-                let len = match (len, sink.fixed_size()) {
-                    (Some(len), _) => usize::from(len),
-                    (None, Some(size)) if size > EXPEDITED_MAX => {
-                        return Err(AbortCode::TOO_SHORT);
-                    }
-                    (None, Some(size)) => size,
-                    (None, None) => EXPEDITED_MAX,
-                };
-                sink.push(od, data.get(..len).unwrap_or(&data), true)
-                    .inspect_err(|_| sink.cancel(od))?;
-            }
-            Initiate::Segmented { size } => {
-                self.state = State::Download {
-                    sink: Sink::open(od, at, size)?,
-                    toggle: false,
-                };
-            }
+    /// How long the client may be silent.
+    const fn patience(&self) -> Duration {
+        match &self.state {
+            State::BlockUpload {
+                sender,
+                phase: Phase::Segments,
+                ..
+            } if sender.is_sending() => Duration::ZERO,
+            State::BlockDownload { receiver, .. } if !receiver.is_complete() => self.timeout.half(),
+            _ => self.timeout,
         }
-        Ok(Some(Answer::Download { at }))
     }
 
-    /// CiA 301, 7.2.4.3.4.
-    fn download_segment(
-        &mut self,
-        segment: Segment,
-        od: &mut impl ObjectDictionary,
-    ) -> Result<Option<Answer>, AbortCode> {
-        let State::Download { sink, toggle } = &mut self.state else {
-            return Err(AbortCode::COMMAND);
-        };
-        if segment.toggle != *toggle {
-            return Err(AbortCode::TOGGLE);
-        }
-        sink.push(od, segment.data(), segment.last)?;
-        *toggle = !*toggle;
-        if segment.last {
-            self.state = State::Idle;
-        }
-        Ok(Some(Answer::DownloadSegment {
-            toggle: segment.toggle,
-        }))
-    }
-
-    /// CiA 301, 7.2.4.3.6.
-    fn upload(
-        &mut self,
-        at: Address,
-        od: &mut impl ObjectDictionary,
-    ) -> Result<Option<Answer>, AbortCode> {
-        let source = Source::open(od, at)?;
-        let mut first = [0; EXPEDITED_MAX];
-        let chunk = source.read(od, 0, &mut first)?;
-        let whole = first.get(..chunk.len).filter(|_| chunk.last);
-        let data = match whole.and_then(Initiate::expedited) {
-            Some(expedited) => expedited,
-            None => {
-                self.state = State::Upload {
-                    source,
-                    toggle: false,
-                    offset: 0,
-                };
-                Initiate::Segmented { size: chunk.size }
-            }
-        };
-        Ok(Some(Answer::Upload { at, data }))
-    }
-
-    /// CiA 301, 7.2.4.3.7.
-    fn upload_segment(
-        &mut self,
-        asked: bool,
-        od: &mut impl ObjectDictionary,
-    ) -> Result<Option<Answer>, AbortCode> {
-        let State::Upload {
-            source,
-            toggle,
-            offset,
-        } = &mut self.state
-        else {
-            return Err(AbortCode::COMMAND);
-        };
-        if asked != *toggle {
-            return Err(AbortCode::TOGGLE);
-        }
-        let mut data = [0; SEGMENT_MAX];
-        let chunk = source.read(od, *offset, &mut data)?;
-        if chunk.len < SEGMENT_MAX && !chunk.last {
-            return Err(AbortCode::GENERAL);
-        }
-        let data = data.get(..chunk.len).unwrap_or(&[]);
-        let segment = Segment::new(asked, chunk.last, data).ok_or(AbortCode::GENERAL)?;
-        *toggle = !*toggle;
-        *offset = offset
-            .checked_add(chunk.len as u32)
-            .ok_or(AbortCode::GENERAL)?;
-        if chunk.last {
-            self.state = State::Idle;
-        }
-        Ok(Some(Answer::UploadSegment(segment)))
+    fn abort(&mut self, at: Address, code: AbortCode, od: &mut impl ObjectDictionary) -> Bytes {
+        self.reset(od);
+        Answer::Abort { at, code }.encode()
     }
 
     /// The entry of the transfer under way.
     const fn address(&self) -> Option<Address> {
         match &self.state {
             State::Idle => None,
-            State::Download { sink, .. } => Some(sink.at),
-            State::Upload { source, .. } => Some(source.at),
+            State::Download { sink, .. } | State::BlockDownload { sink, .. } => Some(sink.at),
+            State::Upload { source, .. } | State::BlockUpload { source, .. } => Some(source.at),
         }
-    }
-
-    fn frame(&self, answer: Answer) -> Frame {
-        Frame::full(self.response, answer.encode())
     }
 }

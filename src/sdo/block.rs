@@ -1,0 +1,231 @@
+//! The two ends of a block transfer. Client and server share them, since a
+//! block download and a block upload differ only in who sends
+//! (CiA 301, 7.2.4.3.8 .. 7.2.4.3.16).
+
+use super::abort::AbortCode;
+use super::command::{BLOCK_MAX, BlockSegment, SEGMENT_MAX};
+use super::crc::Crc16;
+
+/// After so many acknowledgements in a row of nothing at all the sender gives
+/// up: a transfer that makes no progress must end.
+const FRUITLESS_MAX: u8 = 3;
+
+/// # Errors
+/// 05040002h unless a block has 1..=127 segments.
+pub(super) const fn check_block_size(block_size: u8) -> Result<u8, AbortCode> {
+    if block_size >= 1 && block_size <= BLOCK_MAX {
+        Ok(block_size)
+    } else {
+        Err(AbortCode::BLOCK_SIZE)
+    }
+}
+
+/// What the end command tells of the transfer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct End {
+    /// Unused bytes of the last segment.
+    pub(super) unused: u8,
+    /// 0 if one side does not compute it.
+    pub(super) crc: u16,
+}
+
+/// The sending end. It keeps no data: what has to be sent again is read again.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sender {
+    /// Offset of the first byte of the block.
+    base: u32,
+    block_size: u8,
+    /// The last segment sent of the block.
+    sequence: u8,
+    /// The block is not complete yet.
+    sending: bool,
+    /// Bytes of the last segment of all, once that has been read.
+    tail: Option<u8>,
+    use_crc: bool,
+    crc: Crc16,
+    /// The checksum covers the bytes before this offset.
+    summed: u32,
+    fruitless: u8,
+}
+
+impl Sender {
+    pub(super) const fn new(block_size: u8, use_crc: bool) -> Sender {
+        Sender {
+            base: 0,
+            block_size,
+            sequence: 0,
+            sending: true,
+            tail: None,
+            use_crc,
+            crc: Crc16::new(),
+            summed: 0,
+            fruitless: 0,
+        }
+    }
+
+    /// Whether [`Sender::segment`] has something to send, or an
+    /// acknowledgement is awaited.
+    pub(super) const fn is_sending(&self) -> bool {
+        self.sending
+    }
+
+    /// The next segment of the block; `None` if it is complete. `read` fills
+    /// the buffer from an offset on and returns how many bytes there were and
+    /// whether they are the last.
+    pub(super) fn segment(
+        &mut self,
+        read: impl FnOnce(u32, &mut [u8]) -> Result<(usize, bool), AbortCode>,
+    ) -> Result<Option<BlockSegment>, AbortCode> {
+        if !self.sending {
+            return Ok(None);
+        }
+        let offset = self.offset(self.sequence)?;
+        let mut data = [0; SEGMENT_MAX];
+        let (len, last) = read(offset, &mut data)?;
+        let bytes = data.get(..len).ok_or(AbortCode::GENERAL)?;
+        if len < SEGMENT_MAX && !last {
+            return Err(AbortCode::GENERAL);
+        }
+        // What is sent again has been summed before.
+        if self.use_crc && offset == self.summed {
+            self.crc = self.crc.update(bytes);
+            self.summed = offset.checked_add(len as u32).ok_or(AbortCode::GENERAL)?;
+        }
+        self.sequence += 1;
+        self.tail = last.then_some(len as u8);
+        self.sending = !last && self.sequence < self.block_size;
+        Ok(Some(BlockSegment {
+            last,
+            sequence: self.sequence,
+            data,
+        }))
+    }
+
+    /// The receiver has the first `sequence` segments of the block and wants
+    /// `block_size` in the next. Yields the end once it has everything.
+    pub(super) fn acknowledged(
+        &mut self,
+        sequence: u8,
+        block_size: u8,
+    ) -> Result<Option<End>, AbortCode> {
+        if sequence > self.sequence {
+            return Err(AbortCode::SEQUENCE_NUMBER);
+        }
+        if let Some(tail) = self.tail.filter(|_| sequence == self.sequence) {
+            self.sending = false;
+            return Ok(Some(End {
+                unused: (SEGMENT_MAX as u8).saturating_sub(tail),
+                crc: self.crc.get(),
+            }));
+        }
+        self.fruitless = if sequence == 0 { self.fruitless + 1 } else { 0 };
+        if self.fruitless > FRUITLESS_MAX {
+            return Err(AbortCode::SEQUENCE_NUMBER);
+        }
+        self.base = self.offset(sequence)?;
+        self.block_size = check_block_size(block_size)?;
+        self.sequence = 0;
+        self.tail = None;
+        self.sending = true;
+        Ok(None)
+    }
+
+    fn offset(&self, segments: u8) -> Result<u32, AbortCode> {
+        self.base
+            .checked_add(u32::from(segments) * SEGMENT_MAX as u32)
+            .ok_or(AbortCode::TOO_LONG)
+    }
+}
+
+/// The receiving end.
+///
+/// The last segment is held back until the end command has told how many of
+/// its bytes count and the checksum is right.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Receiver {
+    block_size: u8,
+    /// The last segment of the block received in sequence.
+    sequence: u8,
+    held: Option<[u8; SEGMENT_MAX]>,
+    /// The last segment of all is held; the end command is awaited.
+    complete: bool,
+    use_crc: bool,
+    crc: Crc16,
+    stalled: bool,
+}
+
+impl Receiver {
+    pub(super) const fn new(block_size: u8, use_crc: bool) -> Receiver {
+        Receiver {
+            block_size,
+            sequence: 0,
+            held: None,
+            complete: false,
+            use_crc,
+            crc: Crc16::new(),
+            stalled: false,
+        }
+    }
+
+    /// Whether segments are over and the end command is awaited.
+    pub(super) const fn is_complete(&self) -> bool {
+        self.complete
+    }
+
+    /// How many segments a block has.
+    pub(super) const fn block_size(&self) -> u8 {
+        self.block_size
+    }
+
+    /// Takes in a segment; hands the one before it to `deliver`. Returns the
+    /// sequence number to acknowledge where the block is over. A segment out
+    /// of sequence is discarded with all that follow it in the block.
+    pub(super) fn segment(
+        &mut self,
+        segment: BlockSegment,
+        deliver: impl FnOnce(&[u8]) -> Result<(), AbortCode>,
+    ) -> Result<Option<u8>, AbortCode> {
+        self.stalled = false;
+        if segment.sequence == self.sequence + 1 {
+            if let Some(held) = self.held.take() {
+                self.crc = self.crc.update(&held);
+                deliver(&held)?;
+            }
+            self.held = Some(segment.data);
+            self.sequence = segment.sequence;
+            self.complete = segment.last;
+        }
+        let over = segment.last || segment.sequence >= self.block_size;
+        Ok(over.then(|| self.acknowledge()))
+    }
+
+    /// Nothing has come for a while: what to acknowledge so that the sender
+    /// repeats the rest. `None` the second time in a row, or if there is
+    /// nothing to repeat.
+    pub(super) fn stall(&mut self) -> Option<u8> {
+        if self.stalled || self.complete {
+            return None;
+        }
+        self.stalled = true;
+        Some(self.acknowledge())
+    }
+
+    fn acknowledge(&mut self) -> u8 {
+        core::mem::take(&mut self.sequence)
+    }
+
+    /// The end command has come: the bytes of the last segment, if the
+    /// checksum is right.
+    pub(super) fn end(&self, end: End) -> Result<([u8; SEGMENT_MAX], usize), AbortCode> {
+        let held = self
+            .held
+            .filter(|_| self.complete)
+            .ok_or(AbortCode::COMMAND)?;
+        let len = SEGMENT_MAX.saturating_sub(usize::from(end.unused));
+        let crc = self.crc.update(held.get(..len).unwrap_or(&[])).get();
+        if self.use_crc && crc != end.crc {
+            return Err(AbortCode::CRC);
+        }
+        Ok((held, len))
+    }
+}

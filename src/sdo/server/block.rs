@@ -1,0 +1,199 @@
+//! Block transfers (CiA 301, 7.2.4.3.8 .. 7.2.4.3.15).
+
+use super::transfer::{Sink, Source};
+use super::{Phase, Reply, Server, State};
+use crate::id::Address;
+use crate::od::ObjectDictionary;
+use crate::sdo::AbortCode;
+use crate::sdo::block::{End, Receiver, Sender, check_block_size};
+use crate::sdo::command::{Answer, BlockSegment, Bytes, Request};
+use crate::time::Instant;
+
+impl Server {
+    /// A request of a block transfer, other than a segment.
+    pub(super) fn serve_block(
+        &mut self,
+        request: Request,
+        od: &mut impl ObjectDictionary,
+    ) -> Reply {
+        match request {
+            Request::BlockDownload { at, crc, size } => self.block_download(at, crc, size, od),
+            Request::BlockDownloadEnd { unused, crc } => {
+                self.block_download_end(End { unused, crc }, od)
+            }
+            Request::BlockUpload {
+                at,
+                crc,
+                block_size,
+                protocol_switch,
+            } => self.block_upload(at, crc, block_size, protocol_switch, od),
+            Request::BlockUploadStart => self.block_upload_start(),
+            Request::BlockUploadAcknowledge {
+                sequence,
+                block_size,
+            } => self.block_upload_acknowledge(sequence, block_size),
+            Request::BlockUploadEnd => self.block_upload_end(),
+            _ => Err(AbortCode::COMMAND),
+        }
+    }
+
+    /// CiA 301, 7.2.4.3.9.
+    fn block_download(
+        &mut self,
+        at: Address,
+        crc: bool,
+        size: Option<u32>,
+        od: &mut impl ObjectDictionary,
+    ) -> Reply {
+        let block_size = check_block_size(self.block_size).map_err(|_| AbortCode::COMMAND)?;
+        self.state = State::BlockDownload {
+            sink: Sink::open(od, at, size)?,
+            receiver: Receiver::new(block_size, crc),
+        };
+        Ok(Some(Answer::BlockDownload {
+            at,
+            crc: true,
+            block_size,
+        }))
+    }
+
+    /// While a block is being received a frame has no command specifier, except
+    /// for an abort. `None` if this is no such moment.
+    ///
+    /// CiA 301, 7.2.4.3.10.
+    pub(super) fn block_segment(
+        &mut self,
+        bytes: Bytes,
+        od: &mut impl ObjectDictionary,
+    ) -> Option<Reply> {
+        let State::BlockDownload { sink, receiver } = &mut self.state else {
+            return None;
+        };
+        if receiver.is_complete() {
+            return None;
+        }
+        let Some(segment) = BlockSegment::decode(bytes) else {
+            return match Request::decode(bytes) {
+                Some(Request::Abort { .. }) => None,
+                _ => Some(Err(AbortCode::SEQUENCE_NUMBER)),
+            };
+        };
+        let taken = receiver.segment(segment, |data| sink.push(od, data, false));
+        Some(taken.map(|over| {
+            over.map(|sequence| Answer::BlockDownloadAcknowledge {
+                sequence,
+                block_size: receiver.block_size(),
+            })
+        }))
+    }
+
+    /// CiA 301, 7.2.4.3.11.
+    fn block_download_end(&mut self, end: End, od: &mut impl ObjectDictionary) -> Reply {
+        let State::BlockDownload { sink, receiver } = &mut self.state else {
+            return Err(AbortCode::COMMAND);
+        };
+        let (data, len) = receiver.end(end)?;
+        sink.push(od, data.get(..len).unwrap_or(&data), true)?;
+        self.state = State::Idle;
+        Ok(Some(Answer::BlockDownloadEnd))
+    }
+
+    /// CiA 301, 7.2.4.3.13.
+    fn block_upload(
+        &mut self,
+        at: Address,
+        crc: bool,
+        block_size: u8,
+        protocol_switch: u8,
+        od: &mut impl ObjectDictionary,
+    ) -> Reply {
+        if self.block_size == 0 {
+            return Err(AbortCode::COMMAND);
+        }
+        let block_size = check_block_size(block_size)?;
+        let source = Source::open(od, at)?;
+        let size = source.read(od, 0, &mut [0])?.size;
+        if protocol_switch > 0 && size.is_some_and(|size| size <= u32::from(protocol_switch)) {
+            return self.upload(at, od);
+        }
+        self.state = State::BlockUpload {
+            source,
+            sender: Sender::new(block_size, crc),
+            phase: Phase::Start,
+        };
+        Ok(Some(Answer::BlockUpload {
+            at,
+            crc: true,
+            size,
+        }))
+    }
+
+    /// CiA 301, 7.2.4.3.13.
+    fn block_upload_start(&mut self) -> Reply {
+        match &mut self.state {
+            State::BlockUpload { phase, .. } if *phase == Phase::Start => {
+                *phase = Phase::Segments;
+                Ok(None)
+            }
+            _ => Err(AbortCode::COMMAND),
+        }
+    }
+
+    /// CiA 301, 7.2.4.3.14.
+    fn block_upload_acknowledge(&mut self, sequence: u8, block_size: u8) -> Reply {
+        match &mut self.state {
+            State::BlockUpload { sender, phase, .. } if *phase == Phase::Segments => {
+                let end = sender.acknowledged(sequence, block_size)?;
+                Ok(end.map(|End { unused, crc }| {
+                    *phase = Phase::End;
+                    Answer::BlockUploadEnd { unused, crc }
+                }))
+            }
+            _ => Err(AbortCode::COMMAND),
+        }
+    }
+
+    /// CiA 301, 7.2.4.3.15.
+    fn block_upload_end(&mut self) -> Reply {
+        match &self.state {
+            State::BlockUpload { phase, .. } if *phase == Phase::End => {
+                self.state = State::Idle;
+                Ok(None)
+            }
+            _ => Err(AbortCode::COMMAND),
+        }
+    }
+
+    /// At its deadline a block upload sends the next segment, and a block
+    /// download acknowledges what it has, once, so that the rest is sent again.
+    pub(super) fn block_poll(
+        &mut self,
+        now: Instant,
+        od: &mut impl ObjectDictionary,
+    ) -> Result<Option<Bytes>, AbortCode> {
+        let bytes = match &mut self.state {
+            State::BlockUpload {
+                source,
+                sender,
+                phase: Phase::Segments,
+            } => {
+                let read = |offset, buf: &mut [u8]| {
+                    let chunk = source.read(od, offset, buf)?;
+                    Ok((chunk.len, chunk.last))
+                };
+                sender.segment(read)?.map(|segment| segment.encode())
+            }
+            State::BlockDownload { receiver, .. } => receiver.stall().map(|sequence| {
+                let block_size = receiver.block_size();
+                Answer::BlockDownloadAcknowledge {
+                    sequence,
+                    block_size,
+                }
+                .encode()
+            }),
+            _ => None,
+        };
+        self.deadline = now + self.patience();
+        Ok(bytes)
+    }
+}
