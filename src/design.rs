@@ -1,6 +1,8 @@
 //! The firmware's constants, each with its reason. What belongs to the network
 //! rather than to the firmware is in [`crate::network`].
 
+use crate::time::Duration;
+
 /// Axes of the group.
 pub const AXES: usize = 6;
 
@@ -35,3 +37,15 @@ pub const RX_QUEUE: usize = 32;
 
 /// Reports that may wait for the log.
 pub const LOG_QUEUE: usize = 32;
+
+/// How often the LEDs are switched, in milliseconds: far below their shortest
+/// phase of 50 ms.
+pub const LED_MS: u32 = 10;
+
+/// How often the counters of what must not happen are looked at, in
+/// milliseconds: a fault that comes every cycle fills the log slowly.
+pub const COUNTS_MS: u32 = 1000;
+
+/// After how long the configurator runs at the latest, so that it shows up in
+/// the watchdog's roll call several times in its period.
+pub const CONFIGURATOR_PERIOD: Duration = Duration::from_millis(20);

@@ -1,33 +1,69 @@
-//! The tasks and what they share.
+//! The tasks, and what they share.
+//!
+//! | priority | task | runs |
+//! |---|---|---|
+//! | 5 | `sync_tick` | TIM2 update, every cycle |
+//! | 4 | `can_irq` | FDCAN1 line 0, and pended when there is something to send |
+//! | 3 | `pdo_producer` | pended by the last TPDO, or TIM3 compare at the deadline |
+//! | 2 | `network` | TIM7, every millisecond, and pended by `can_irq` |
+//! | 1 | `sdo_configurator` | woken by `network` |
+//! | 0 | `idle` | sleeps |
+//!
+//! | resource | ceiling | held for |
+//! |---|---|---|
+//! | `od` | 5 | one entry copied |
+//! | `can_tx` | 5 | one buffer filled and requested |
+//! | `tx_queue` | 4 | one frame put in or taken out |
+//! | `control` | 3 | one copy |
+//!
+//! Budgets are cycles at 170 MHz for six axes.
 
 #[rtic::app(device = nucleo_g474re::pac, peripherals = true, dispatchers = [UART4])]
 mod app {
     use crate::{
-        counters,
+        axes::Axes,
+        control::Control,
+        counters::{self, Counts},
         filters::{self, Handler},
+        leds,
+        log::{Log, News},
         roll::{self, Task},
+        wake,
     };
     use canmaster::{
-        Frame, design,
-        id::{CobId, FunctionCode, NodeId},
-        master::{Debounce, ExtendedClock, MasterOd, Reception, TpdoSlot, TxQueue},
-        time::{Duration, Instant},
+        Frame,
+        boot::{Action, Event, NetworkBoot},
+        design::{self, AXES},
+        id::{CobId, FunctionCode},
+        master::{
+            self, AxisMap, Debounce, ExtendedClock, MasterOd, Put, Reception, Report, Supervisor,
+            TPDOS_PER_AXIS, TpdoSlot, TpdoSlots, TxQueue,
+        },
+        motion::{GroupEvent, experiment},
+        network::{Network, sample},
+        nmt,
+        time::Instant,
     };
     use heapless::spsc::{Consumer, Producer, Queue};
-    use nucleo_g474re::{Config, can, pac::Interrupt, pins, timers, watchdog::Watchdog};
-    use rtic_sync::signal::Signal;
+    use nucleo_g474re::{
+        Config, can, pac::Interrupt, pins, reset_cause::ResetCause, timers, watchdog::Watchdog,
+    };
+    use rtic::Mutex;
 
     type FrameQueue = Queue<Frame, { design::RX_QUEUE }>;
+    type NewsQueue = Queue<News, { design::LOG_QUEUE }>;
+    type EventQueue = Queue<GroupEvent, { design::LOG_QUEUE }>;
 
+    static NETWORK: &Network = &sample::SIX_EPOS4;
     static CLOCK: ExtendedClock = ExtendedClock::new();
-    static WAKE: Signal<()> = Signal::new();
-    static LENGTHS: [[u8; 2]; design::AXES] = [[6, 6]; design::AXES];
 
     #[shared]
     struct Shared {
-        od: MasterOd<{ design::AXES }>,
+        od: MasterOd<AXES>,
         can_tx: can::Tx,
         tx_queue: TxQueue<{ design::TX_QUEUE }>,
+        control: Control,
+        bus: can::ErrorState,
     }
 
     #[local]
@@ -35,68 +71,113 @@ mod app {
         period: timers::Period,
         sync: can::Element,
         can_rx: can::Rx,
+        axis_map: AxisMap,
         to_network: Producer<'static, Frame>,
-        to_configurator: Producer<'static, Frame>,
+        answers_to: Producer<'static, Frame>,
         deadline: timers::Deadline,
+        axes: Axes,
+        events_to: Producer<'static, GroupEvent>,
         tick: timers::Tick,
         microseconds: timers::Microseconds,
+        milliseconds: u32,
         run_led: pins::RunLed,
         error_led: pins::ErrorLed,
         button: pins::Button,
         debounce: Debounce,
         watchdog: Watchdog,
         from_can: Consumer<'static, Frame>,
-        next_heartbeat: Instant,
+        states_to: Producer<'static, Frame>,
+        news_to: Producer<'static, News>,
+        supervisor: Supervisor<AXES>,
+        heartbeat: nmt::Producer,
+        counts: Counts,
+        known_bus: can::ErrorState,
+        reset_cause: ResetCause,
+        clock: timers::Microseconds,
         answers: Consumer<'static, Frame>,
+        states: Consumer<'static, Frame>,
+        news: Consumer<'static, News>,
+        events: Consumer<'static, GroupEvent>,
     }
 
-    #[init(local = [network_queue: FrameQueue = Queue::new(), answer_queue: FrameQueue = Queue::new()])]
+    /// Sets up the board and hands each task its part. Runs with interrupts off,
+    /// before anything can be late.
+    #[init(local = [
+        lengths: [[u8; TPDOS_PER_AXIS]; AXES] = [[0; TPDOS_PER_AXIS]; AXES],
+        network_queue: FrameQueue = Queue::new(),
+        answer_queue: FrameQueue = Queue::new(),
+        state_queue: FrameQueue = Queue::new(),
+        news_queue: NewsQueue = Queue::new(),
+        event_queue: EventQueue = Queue::new(),
+    ])]
     fn init(cx: init::Context) -> (Shared, Local) {
+        let cycle_us = defmt::unwrap!(u16::try_from(NETWORK.cycle.as_micros()).ok());
         let board = nucleo_g474re::setup(
             cx.device,
             &Config {
-                period_us: 10_000,
+                period_us: cycle_us,
                 deadline_us: design::TPDO_DEADLINE_US,
                 watchdog_ms: design::WATCHDOG_MS,
                 filters: &filters::FILTERS,
             },
         );
-        defmt::info!(
-            "canmaster {=str}: reset by {=str}",
-            env!("CARGO_PKG_VERSION"),
-            board.reset_cause.text()
-        );
+        // What the firmware exchanges with an axis and what the network
+        // describes has to be the same.
+        defmt::assert_eq!(NETWORK.nodes.len(), AXES);
+        defmt::assert!(NETWORK.nodes.iter().all(master::fits));
+        *cx.local.lengths = master::lengths(NETWORK);
+
         let (to_network, from_can) = cx.local.network_queue.split();
-        let (to_configurator, answers) = cx.local.answer_queue.split();
+        let (answers_to, answers) = cx.local.answer_queue.split();
+        let (states_to, states) = cx.local.state_queue.split();
+        let (news_to, news) = cx.local.news_queue.split();
+        let (events_to, events) = cx.local.event_queue.split();
         let sync = defmt::unwrap!(can::Element::new(&Frame::empty(CobId::SYNC)));
         defmt::unwrap!(sdo_configurator::spawn().ok());
         (
             Shared {
-                od: MasterOd::new(&LENGTHS),
+                od: MasterOd::new(cx.local.lengths),
                 can_tx: board.can_tx,
                 tx_queue: TxQueue::new(),
+                control: Control::new(),
+                bus: can::ErrorState::Active,
             },
             Local {
                 period: board.period,
                 sync,
                 can_rx: board.can_rx,
+                axis_map: AxisMap::new(NETWORK),
                 to_network,
-                to_configurator,
+                answers_to,
                 deadline: board.deadline,
+                axes: Axes::new(NETWORK, &experiment::GROUP),
+                events_to,
                 tick: board.tick,
                 microseconds: board.microseconds,
+                milliseconds: 0,
                 run_led: board.run_led,
                 error_led: board.error_led,
                 button: board.button,
                 debounce: Debounce::new(design::BUTTON_SAMPLES),
                 watchdog: board.watchdog,
                 from_can,
-                next_heartbeat: Instant::from_micros(600_000),
+                states_to,
+                news_to,
+                supervisor: Supervisor::new(NETWORK),
+                heartbeat: nmt::Producer::new(NETWORK.master.node),
+                counts: Counts::default(),
+                known_bus: can::ErrorState::Active,
+                reset_cause: board.reset_cause,
+                clock: board.microseconds,
                 answers,
+                states,
+                news,
+                events,
             },
         )
     }
 
+    /// Sleeps until the next interrupt.
     #[idle]
     fn idle(_: idle::Context) -> ! {
         loop {
@@ -104,130 +185,349 @@ mod app {
         }
     }
 
+    /// Requests the SYNC and opens the cycle.
+    ///
+    /// Trigger: TIM2 update, to the clock tick. Budget: 170 cycles from the
+    /// timer's event to the transmit request. If it is late, the SYNC is, by as
+    /// much: jitter. If the last SYNC still waits for the bus, none is sent and
+    /// that is counted.
     #[task(binds = TIM2, priority = 5, local = [period, sync], shared = [od, can_tx])]
     fn sync_tick(cx: sync_tick::Context) {
-        cx.local.period.acknowledge();
-        let sync = *cx.local.sync;
+        let sync = cx.local.sync;
         (cx.shared.od, cx.shared.can_tx).lock(|od, can_tx| {
             if !od.sync_producer() {
                 return;
             }
-            if can_tx.holds(CobId::SYNC.into()) || can_tx.transmit(&sync).is_err() {
+            if can_tx.holds(CobId::SYNC.into()) || can_tx.transmit(sync).is_err() {
                 counters::SYNC_NOT_SENT.count();
             }
             od.open_cycle();
         });
+        cx.local.period.acknowledge();
         roll::check_in(Task::SyncTick);
     }
 
-    #[task(binds = FDCAN1_IT0, priority = 4, local = [can_rx, to_network, to_configurator], shared = [od, can_tx, tx_queue])]
+    /// Empties the receive FIFOs and refills the transmit buffers.
+    ///
+    /// Trigger: FDCAN1 line 0 (frame received, frame sent, error state), or
+    /// pended by a task that put something into the transmit queue. Budget: 1500
+    /// cycles for three frames each way. If it takes longer than three frames on
+    /// the bus (141 us, 24 000 cycles), a FIFO overruns: frames are lost, which
+    /// is counted; a lost TPDO is missing in its cycle.
+    #[task(
+        binds = FDCAN1_IT0,
+        priority = 4,
+        local = [can_rx, axis_map, to_network, answers_to],
+        shared = [od, can_tx, tx_queue, bus]
+    )]
     fn can_irq(mut cx: can_irq::Context) {
-        let flags = cx.local.can_rx.take_flags();
+        let can_irq::LocalResources {
+            can_rx,
+            axis_map,
+            to_network,
+            answers_to,
+            ..
+        } = cx.local;
+        let flags = can_rx.take_flags();
         if flags.message_lost() {
             counters::RX_OVERRUNS.count();
         }
-        loop {
-            let received = cx
-                .local
-                .can_rx
-                .receive(can::Fifo::Fifo0)
-                .or_else(|| cx.local.can_rx.receive(can::Fifo::Fifo1));
-            let Some(element) = received else { break };
-            match filters::HANDLERS.get(usize::from(element.filter())) {
-                Some(Handler::Tpdo(number)) => {
-                    let node = element.identifier().map_or(0, |id| id.as_raw() & 0x7F);
-                    let Some(slot) = TpdoSlot::new(usize::from(node).wrapping_sub(1), *number)
-                    else {
-                        continue;
-                    };
-                    let got = cx
-                        .shared
-                        .od
-                        .lock(|od| od.store(slot, element.bytes(), element.len()));
-                    match got {
-                        Reception::Last => rtic::pend(Interrupt::TIM3),
-                        Reception::WrongLength => counters::TPDO_LENGTH.count(),
-                        Reception::Stored => {}
-                    }
-                }
-                Some(Handler::Emcy | Handler::ErrorControl) => {
-                    if let Some(frame) = element.frame()
-                        && cx.local.to_network.enqueue(frame).is_err()
-                    {
-                        counters::RX_QUEUE_FULL.count();
-                    }
-                    rtic::pend(Interrupt::TIM7);
-                }
-                Some(Handler::SdoResponse) => {
-                    if let Some(frame) = element.frame()
-                        && cx.local.to_configurator.enqueue(frame).is_err()
-                    {
-                        counters::RX_QUEUE_FULL.count();
-                    }
-                    rtic::pend(Interrupt::TIM7);
-                }
-                None => {}
+        if flags.error_state_changed() {
+            let state = can_rx.error_state();
+            cx.shared.bus.lock(|bus| *bus = state);
+            if state == can::ErrorState::BusOff {
+                // Nothing that waits now may be sent when the bus is back.
+                cx.shared.tx_queue.lock(TxQueue::clear);
+                cx.shared.can_tx.lock(can::Tx::cancel_all);
             }
         }
+
+        while let Some(element) = can_rx
+            .receive(can::Fifo::Fifo0)
+            .or_else(|| can_rx.receive(can::Fifo::Fifo1))
+        {
+            let Some(handler) = filters::HANDLERS.get(usize::from(element.filter())) else {
+                continue;
+            };
+            match handler {
+                Handler::Tpdo(number) => {
+                    let axis = element
+                        .identifier()
+                        .and_then(|id| axis_map.axis(id.as_raw()));
+                    let slot = axis.and_then(|axis| TpdoSlot::new(axis, *number));
+                    let (Some(slot), false) = (slot, element.is_remote()) else {
+                        continue;
+                    };
+                    let (data, length) = (element.bytes(), element.len());
+                    match cx.shared.od.lock(|od| od.store(slot, data, length)) {
+                        Reception::Stored => {}
+                        Reception::Last => rtic::pend(Interrupt::TIM3),
+                        Reception::WrongLength => counters::TPDO_LENGTH.count(),
+                    }
+                }
+                Handler::Emcy | Handler::ErrorControl => {
+                    queue(to_network, element.frame());
+                    rtic::pend(Interrupt::TIM7);
+                }
+                Handler::SdoResponse => {
+                    queue(answers_to, element.frame());
+                    wake::want();
+                    rtic::pend(Interrupt::TIM7);
+                }
+            }
+        }
+
         loop {
-            let pending = cx.shared.can_tx.lock(|tx| tx.pending());
+            let pending = cx.shared.can_tx.lock(|can_tx| can_tx.pending());
             let pending = pending.into_iter().flatten().map(CobId::from);
             let Some(frame) = cx.shared.tx_queue.lock(|queue| queue.next(pending)) else {
                 break;
             };
+            // The frame is made ready before the SYNC is held off.
             let Some(element) = can::Element::new(&frame) else {
                 continue;
             };
-            if cx.shared.can_tx.lock(|tx| tx.transmit(&element)).is_err() {
-                break;
+            // Two other frames at most were pending, and a SYNC: there is room.
+            if cx
+                .shared
+                .can_tx
+                .lock(|can_tx| can_tx.transmit(&element))
+                .is_err()
+            {
+                counters::RPDO_REPLACED.count();
             }
         }
         roll::check_in(Task::CanIrq);
     }
 
-    #[task(binds = TIM3, priority = 3, local = [deadline], shared = [od, tx_queue])]
-    fn pdo_producer(mut cx: pdo_producer::Context) {
-        let deadline = cx.local.deadline.take();
-        cx.shared.od.lock(|od| od.take_cycle(deadline));
-        roll::check_in(Task::PdoProducer);
+    /// Hands a frame on; a full queue is counted.
+    fn queue(to: &mut Producer<'static, Frame>, frame: Option<Frame>) {
+        if let Some(frame) = frame
+            && to.enqueue(frame).is_err()
+        {
+            counters::RX_QUEUE_FULL.count();
+        }
     }
 
-    #[task(binds = TIM7, priority = 2, local = [tick, microseconds, run_led, error_led, button, debounce, watchdog, from_can, next_heartbeat], shared = [od, tx_queue])]
-    fn network(mut cx: network::Context) {
-        let counter = cx.local.microseconds.now();
-        CLOCK.keep(counter);
-        let now = CLOCK.now(|| counter);
-        while cx.local.from_can.dequeue().is_some() {}
-        WAKE.writer().write(());
-        if cx.local.tick.take() {
-            if cx.local.debounce.press(cx.local.button.is_pressed()) {
-                cx.local.error_led.set(true);
-            }
-            if now >= *cx.local.next_heartbeat {
-                *cx.local.next_heartbeat += Duration::from_millis(50);
-                let on = (now.as_micros() / 200_000).is_multiple_of(2);
-                cx.local.run_led.set(on);
-                let id = CobId::of(FunctionCode::ErrorControl, NodeId::MAX);
-                if let Some(frame) = Frame::data_frame(id, &[0x7F]) {
-                    let _ = cx.shared.tx_queue.lock(|queue| queue.put(frame));
-                }
-                cx.shared.od.lock(|od| od.set_sync_producer(true));
-            }
+    /// Takes in the TPDOs of this SYNC, steps the axes, and writes the RPDOs that
+    /// the next SYNC puts into effect.
+    ///
+    /// Trigger: pended by the last expected TPDO, or TIM3 compare at the
+    /// deadline, whichever is first; once per cycle. Budget: 20 000 cycles. If it
+    /// has not run before the next SYNC, that cycle is an overrun: it is counted,
+    /// and the drives keep the set-points of the cycle before.
+    #[task(
+        binds = TIM3,
+        priority = 3,
+        local = [deadline, axes, events_to],
+        shared = [od, tx_queue, control]
+    )]
+    fn pdo_producer(mut cx: pdo_producer::Context) {
+        let deadline = cx.local.deadline.take();
+        roll::check_in(Task::PdoProducer);
+        let Some(cycle) = cx.shared.od.lock(|od| od.take_cycle(deadline)) else {
+            return;
+        };
+        let control = cx.shared.control.lock(Control::take);
+        if !control.started {
+            return;
+        }
+        let axes = cx.local.axes;
+        axes.read(&cycle, |slot| cx.shared.od.lock(|od| od.tpdo(slot)));
+        axes.step(&control);
+        if !control.bus_off {
+            axes.write(
+                |frame| match cx.shared.tx_queue.lock(|queue| queue.put_latest(frame)) {
+                    Ok(Put::Queued) => {}
+                    Ok(Put::Replaced) => counters::RPDO_REPLACED.count(),
+                    // The queue counts it.
+                    Err(_) => {}
+                },
+            );
             rtic::pend(Interrupt::FDCAN1_IT0);
         }
+        while let Some(event) = axes.take_event() {
+            if cx.local.events_to.enqueue(event).is_err() {
+                counters::LOG_FULL.count();
+            }
+            wake::want();
+        }
+    }
+
+    /// Error control both ways, emergencies, button, LEDs, and the watchdog.
+    ///
+    /// Trigger: TIM7, every millisecond, or pended by `can_irq` for a frame.
+    /// Budget: 5 000 cycles. If it is late, so is the reaction to a lost node; a
+    /// heartbeat missing for 200 ms stops the drives; after 100 ms without it
+    /// the watchdog resets the board.
+    #[task(
+        binds = TIM7,
+        priority = 2,
+        local = [
+            tick, microseconds, milliseconds, run_led, error_led, button, debounce, watchdog,
+            from_can, states_to, news_to, supervisor, heartbeat, counts, known_bus,
+        ],
+        shared = [od, tx_queue, control, bus]
+    )]
+    fn network(mut cx: network::Context) {
+        let local = cx.local;
+        let counter = local.microseconds.now();
+        CLOCK.keep(counter);
+        let now = CLOCK.now(|| counter);
+        let tick = local.tick.take();
+
+        while let Some(frame) = local.from_can.dequeue() {
+            if let Some((FunctionCode::ErrorControl, _)) = frame.id().split() {
+                queue(local.states_to, Some(frame));
+                wake::want();
+            }
+            if let Some(report) = local.supervisor.on_frame(&frame, now) {
+                tell(report, local.news_to, &mut cx.shared.control);
+            }
+        }
+        if tick {
+            *local.milliseconds = local.milliseconds.wrapping_add(1);
+            while let Some(report) = local.supervisor.poll(now) {
+                tell(report, local.news_to, &mut cx.shared.control);
+            }
+            let bus = cx.shared.bus.lock(|bus| *bus);
+            let pressed = local.debounce.press(local.button.is_pressed());
+            let control = cx.shared.control.lock(|control| {
+                control.pressed |= pressed;
+                control.bus_off |= bus == can::ErrorState::BusOff;
+                *control
+            });
+            if bus != *local.known_bus {
+                *local.known_bus = bus;
+                publish(local.news_to, News::ErrorState(bus));
+            }
+            if control.network_ready {
+                local.supervisor.arm();
+            }
+            if control.speaking && local.heartbeat.next_deadline().is_none() {
+                local.heartbeat.set_period(NETWORK.master.heartbeat, now);
+            }
+            if let Some(frame) = local.heartbeat.poll(now, control.state())
+                && !control.bus_off
+            {
+                // A full queue counts it.
+                let _ = cx.shared.tx_queue.lock(|queue| queue.put(frame));
+            }
+            if local.milliseconds.is_multiple_of(design::LED_MS) {
+                let lost = local.supervisor.any_lost();
+                local.run_led.set(leds::run(&control, now));
+                local.error_led.set(leds::error(&control, bus, lost, now));
+            }
+            if local.milliseconds.is_multiple_of(design::COUNTS_MS) {
+                let overruns = cx.shared.od.lock(|od| od.overruns());
+                let overflows = cx.shared.tx_queue.lock(|queue| queue.overflows());
+                let counts = Counts::now(overruns, overflows);
+                if counts != *local.counts {
+                    *local.counts = counts;
+                    publish(local.news_to, News::Counts(counts));
+                }
+            }
+            // Sends the heartbeat, and shows that it is alive.
+            rtic::pend(Interrupt::FDCAN1_IT0);
+        }
+        wake::if_due(counter);
         if roll::complete() {
-            cx.local.watchdog.feed();
+            local.watchdog.feed();
         }
         roll::check_in(Task::Network);
     }
 
-    #[task(priority = 1, local = [answers])]
-    async fn sdo_configurator(cx: sdo_configurator::Context) {
-        let mut wake = WAKE.take_reader();
+    /// Hands a report to the log, and a fault to the group.
+    fn tell(
+        report: Report,
+        news: &mut Producer<'static, News>,
+        control: &mut impl rtic::Mutex<T = Control>,
+    ) {
+        if let (Some(axis), Some(cause)) = (report.axis, report.notice.fault()) {
+            control.lock(|control| control.tell_fault(axis, cause));
+        }
+        publish(news, News::Node(report));
+    }
+
+    /// Hands something to the log.
+    fn publish(to: &mut Producer<'static, News>, news: News) {
+        if to.enqueue(news).is_err() {
+            counters::LOG_FULL.count();
+        }
+        wake::want();
+    }
+
+    /// Boots, checks and configures the nodes, all at once, starts them, and
+    /// writes the log.
+    ///
+    /// Trigger: woken by `network` for a frame, a line of the log, or at the next
+    /// deadline of the boot-up. Budget: none; everything else goes first. If it
+    /// is starved, nodes take longer to boot, and after 100 ms the watchdog
+    /// resets the board.
+    #[task(
+        priority = 1,
+        local = [reset_cause, clock, answers, states, news, events],
+        shared = [od, tx_queue, control]
+    )]
+    async fn sdo_configurator(mut cx: sdo_configurator::Context) {
+        let local = cx.local;
+        let mut wake = wake::reader();
+        let mut log = Log::new();
+        defmt::info!(
+            "canmaster {=str}, started by: {=str}",
+            env!("CARGO_PKG_VERSION"),
+            local.reset_cause.text()
+        );
+        defmt::info!(
+            "silent for {=u32} ms, so that drives left running come to rest",
+            NETWORK.master.silence.as_millis()
+        );
+        let mut boot = NetworkBoot::<AXES>::new(NETWORK, now(*local.clock));
         loop {
-            wake.wait().await;
-            while cx.local.answers.dequeue().is_some() {}
+            // The time first, then one frame at a time: each may cause several
+            // actions, which are carried out before the next.
+            loop {
+                while let Some(action) = boot.poll(now(*local.clock)) {
+                    act(&action, &mut log, &mut cx.shared);
+                }
+                let frame = local.answers.dequeue().or_else(|| local.states.dequeue());
+                let Some(frame) = frame else { break };
+                boot.on_frame(&frame, now(*local.clock));
+            }
+            while let Some(news) = local.news.dequeue() {
+                log.news(&news);
+            }
+            while let Some(event) = local.events.dequeue() {
+                log.group(&event);
+            }
             roll::check_in(Task::SdoConfigurator);
+            let latest = now(*local.clock) + design::CONFIGURATOR_PERIOD;
+            let next = boot.next_deadline().map_or(latest, |next| next.min(latest));
+            wake::at(next.as_micros() as u32);
+            wake.wait().await;
+        }
+    }
+
+    fn now(clock: timers::Microseconds) -> Instant {
+        CLOCK.now(|| clock.now())
+    }
+
+    /// Carries out what the boot-up asks for.
+    fn act(action: &Action, log: &mut Log, shared: &mut sdo_configurator::SharedResources<'_>) {
+        match action {
+            Action::Send(frame) => {
+                // A full queue counts it; an SDO request is repeated.
+                let _ = shared.tx_queue.lock(|queue| queue.put(*frame));
+                rtic::pend(Interrupt::FDCAN1_IT0);
+            }
+            Action::ProduceSync => shared.od.lock(|od| od.set_sync_producer(true)),
+            Action::Report(event) => {
+                if *event == Event::StartSent {
+                    shared.od.lock(|od| od.expect(TpdoSlots::all_of(AXES)));
+                }
+                shared.control.lock(|control| control.boot(event));
+                log.boot(event);
+            }
         }
     }
 }

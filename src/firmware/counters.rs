@@ -17,17 +17,52 @@ impl Counter {
         self.0.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// So many.
-    pub(crate) fn get(&self) -> u32 {
+    fn get(&self) -> u32 {
         self.0.load(Ordering::Relaxed)
     }
 }
 
 /// SYNCs not sent because the last one was still waiting for the bus.
 pub(crate) static SYNC_NOT_SENT: Counter = Counter::new();
+/// RPDOs that were still waiting when the next one came.
+pub(crate) static RPDO_REPLACED: Counter = Counter::new();
 /// Received frames that the controller lost because a FIFO was full.
 pub(crate) static RX_OVERRUNS: Counter = Counter::new();
 /// Received frames lost because a task's queue was full.
 pub(crate) static RX_QUEUE_FULL: Counter = Counter::new();
 /// TPDOs of a length that is not the mapped one.
 pub(crate) static TPDO_LENGTH: Counter = Counter::new();
+
+/// Lines that found the queue to the log full.
+pub(crate) static LOG_FULL: Counter = Counter::new();
+
+/// All counts at one moment.
+#[derive(Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Counts {
+    pub(crate) sync_not_sent: u32,
+    pub(crate) rpdo_replaced: u32,
+    /// Cycles that `pdo_producer` did not take up before the next SYNC.
+    pub(crate) cycle_overruns: u32,
+    /// Frames that found the transmit queue full.
+    pub(crate) tx_overflows: u32,
+    pub(crate) rx_overruns: u32,
+    pub(crate) rx_queue_full: u32,
+    pub(crate) tpdo_length: u32,
+    pub(crate) log_full: u32,
+}
+
+impl Counts {
+    /// The counters here, and the two that others keep.
+    pub(crate) fn now(cycle_overruns: u32, tx_overflows: u32) -> Counts {
+        Counts {
+            sync_not_sent: SYNC_NOT_SENT.get(),
+            rpdo_replaced: RPDO_REPLACED.get(),
+            cycle_overruns,
+            tx_overflows,
+            rx_overruns: RX_OVERRUNS.get(),
+            rx_queue_full: RX_QUEUE_FULL.get(),
+            tpdo_length: TPDO_LENGTH.get(),
+            log_full: LOG_FULL.get(),
+        }
+    }
+}

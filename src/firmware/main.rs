@@ -5,13 +5,23 @@
 #[cfg(target_os = "none")]
 mod app;
 #[cfg(target_os = "none")]
+mod axes;
+#[cfg(target_os = "none")]
+mod control;
+#[cfg(target_os = "none")]
 mod counters;
 #[cfg(target_os = "none")]
 mod filters;
 #[cfg(target_os = "none")]
 mod hard_fault;
 #[cfg(target_os = "none")]
+mod leds;
+#[cfg(target_os = "none")]
+mod log;
+#[cfg(target_os = "none")]
 mod roll;
+#[cfg(target_os = "none")]
+mod wake;
 
 #[cfg(target_os = "none")]
 use {defmt_rtt as _, panic_probe as _};

@@ -1,19 +1,26 @@
 //! What the tasks of a CANopen master share: the transmit queue, the cyclic part
-//! of the master's object dictionary, liveness of the TPDOs, the roll call
-//! before the watchdog is fed, the debounced button, the clock.
+//! of the master's object dictionary, the PDOs of an axis, the roll call
+//! before the watchdog is fed, the supervision of the nodes, the debounced button,
+//! the clock.
 //!
 //! All of it is plain data: who may touch it when is the firmware's business.
 
+mod axis_map;
+mod axis_pdo;
 mod clock;
 mod debounce;
-mod liveness;
 mod od;
+mod ramps;
 mod roll_call;
+mod supervisor;
 mod tx_queue;
 
+pub use axis_map::AxisMap;
+pub use axis_pdo::{feedback, fits, lengths, rpdo1, rpdo2};
 pub use clock::ExtendedClock;
 pub use debounce::Debounce;
-pub use liveness::{Liveness, MissingTpdo};
 pub use od::{Cycle, MasterOd, Reception, TPDOS_PER_AXIS, TpdoSlot, TpdoSlots};
+pub use ramps::Ramps;
 pub use roll_call::RollCall;
+pub use supervisor::{Notice, Report, Supervisor};
 pub use tx_queue::{Overflow, Put, TxQueue};

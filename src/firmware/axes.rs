@@ -1,0 +1,73 @@
+//! From the TPDOs of one SYNC to the RPDOs of the next.
+
+use crate::control::Control;
+use canmaster::{
+    Frame,
+    design::AXES,
+    master::{self, Cycle, Ramps, TpdoSlot},
+    motion::{AxisCommand, AxisFeedback, Group, GroupConfig, GroupEvent, GroupState, Request},
+    network::Network,
+};
+
+/// The group with what surrounds it.
+pub(crate) struct Axes {
+    network: &'static Network,
+    group: Group<AXES>,
+    feedback: [AxisFeedback; AXES],
+    commands: [AxisCommand; AXES],
+    ramps: Ramps<AXES>,
+}
+
+impl Axes {
+    pub(crate) fn new(network: &'static Network, config: &'static GroupConfig<AXES>) -> Axes {
+        Axes {
+            network,
+            group: Group::new(config),
+            feedback: [AxisFeedback::default(); AXES],
+            commands: [AxisCommand::default(); AXES],
+            ramps: Ramps::new(),
+        }
+    }
+
+    /// Takes in the TPDOs of a cycle, each through `tpdo`.
+    pub(crate) fn read(&mut self, cycle: &Cycle, mut tpdo: impl FnMut(TpdoSlot) -> [u8; 8]) {
+        for (axis, feedback) in self.feedback.iter_mut().enumerate() {
+            let (Some(first), Some(second)) = (TpdoSlot::new(axis, 0), TpdoSlot::new(axis, 1))
+            else {
+                continue;
+            };
+            let fresh = !cycle.missing.contains(first) && !cycle.missing.contains(second);
+            *feedback = master::feedback(tpdo(first), tpdo(second), fresh);
+        }
+    }
+
+    /// Steps the group. A press of the button releases the motion, and stops it
+    /// when there is one.
+    pub(crate) fn step(&mut self, control: &Control) {
+        let moving = self.group.state() == GroupState::Moving;
+        let request = Request {
+            // After bus-off the way back is a reset of the board.
+            network_ready: control.network_ready && !control.bus_off,
+            release: control.pressed && !moving,
+            stop: control.pressed && moving,
+            fault: control.fault,
+        };
+        self.group.step(request, &self.feedback, &mut self.commands);
+    }
+
+    /// What the group has to report.
+    pub(crate) fn take_event(&mut self) -> Option<GroupEvent> {
+        self.group.take_event()
+    }
+
+    /// Hands the RPDOs of the next cycle to `send`.
+    pub(crate) fn write(&mut self, mut send: impl FnMut(Frame)) {
+        let due = self.ramps.due(&self.commands);
+        for ((node, command), ramps) in self.network.nodes.iter().zip(&self.commands).zip(due) {
+            send(master::rpdo1(node.id, command));
+            if ramps {
+                send(master::rpdo2(node.id, command));
+            }
+        }
+    }
+}

@@ -1,0 +1,71 @@
+//! What the slower tasks tell the PDO producer and each other.
+
+use canmaster::{boot::Event, motion::FaultCause, nmt};
+
+/// Shared by `pdo_producer`, `network` and `sdo_configurator`.
+#[expect(unreachable_pub, reason = "RTIC wants shared resources to be public")]
+#[derive(Clone, Copy)]
+pub struct Control {
+    /// The silent phase is over: the master may speak.
+    pub(crate) speaking: bool,
+    /// NMT start was sent: RPDOs go out every cycle.
+    pub(crate) started: bool,
+    /// Every mandatory node is checked, configured and operational.
+    pub(crate) network_ready: bool,
+    /// The button was pressed.
+    pub(crate) pressed: bool,
+    /// A fault seen outside the group that it does not know of yet.
+    pub(crate) fault: Option<(usize, FaultCause)>,
+    /// A mandatory node could not be booted.
+    pub(crate) boot_failed: bool,
+    /// The controller is or was bus-off.
+    pub(crate) bus_off: bool,
+}
+
+impl Control {
+    pub(crate) const fn new() -> Control {
+        Control {
+            speaking: false,
+            started: false,
+            network_ready: false,
+            pressed: false,
+            fault: None,
+            boot_failed: false,
+            bus_off: false,
+        }
+    }
+
+    /// Takes note of a step of the boot-up.
+    pub(crate) fn boot(&mut self, event: &Event) {
+        match event {
+            Event::ResetSent => self.speaking = true,
+            Event::StartSent => self.started = true,
+            Event::NetworkReady => self.network_ready = true,
+            Event::NetworkFailed => self.boot_failed = true,
+            _ => {}
+        }
+    }
+
+    /// The NMT state of the master itself.
+    pub(crate) const fn state(&self) -> nmt::State {
+        match (self.speaking, self.started) {
+            (false, _) => nmt::State::Initialising,
+            (true, false) => nmt::State::PreOperational,
+            (true, true) => nmt::State::Operational,
+        }
+    }
+
+    /// Tells the group of a fault; of several between two cycles, the first.
+    pub(crate) fn tell_fault(&mut self, axis: usize, cause: FaultCause) {
+        self.fault.get_or_insert((axis, cause));
+    }
+
+    /// For a step of the group: the button and the fault are taken, so that each
+    /// counts once.
+    pub(crate) fn take(&mut self) -> Control {
+        let taken = *self;
+        self.pressed = false;
+        self.fault = None;
+        taken
+    }
+}

@@ -1,0 +1,121 @@
+//! The log, in words. Only `sdo_configurator`, the task of the lowest priority,
+//! writes it: the others hand over what they have to say, so that no log line
+//! delays them and no two collide.
+
+use crate::counters::Counts;
+use canmaster::{
+    boot::Event,
+    master::{Notice, Report},
+    motion::{FaultCause, GroupEvent, GroupState},
+};
+use defmt::{Display2Format, error, info, warn};
+use nucleo_g474re::can::ErrorState;
+
+/// What `network` has to say.
+#[derive(Clone, Copy)]
+pub(crate) enum News {
+    Node(Report),
+    ErrorState(ErrorState),
+    Counts(Counts),
+}
+
+/// Writes the log.
+pub(crate) struct Log {
+    /// The first fault is the error; what follows from it is a warning, so that
+    /// the last error line is the reason.
+    faulted: bool,
+}
+
+impl Log {
+    pub(crate) const fn new() -> Log {
+        Log { faulted: false }
+    }
+
+    /// A step of the boot-up.
+    pub(crate) fn boot(&mut self, event: &Event) {
+        match event {
+            Event::Failed(..) => error!("{}", event),
+            Event::NetworkFailed => warn!("{}", event),
+            Event::Configuring { .. } => defmt::debug!("{}", event),
+            _ => info!("{}", event),
+        }
+    }
+
+    /// What `network` had to say.
+    pub(crate) fn news(&mut self, news: &News) {
+        match news {
+            News::Node(Report { axis, notice }) => self.notice(axis.is_some(), notice),
+            News::ErrorState(ErrorState::BusOff) => self.fault(format_args!(
+                "CAN controller bus-off: check CAN_H and CAN_L for a short or exchanged wires, the termination, and the bit rate of every node; then reset the board"
+            )),
+            News::ErrorState(ErrorState::Passive) => {
+                warn!("CAN controller error passive: is any other node on the bus, and the bus terminated?");
+            }
+            News::ErrorState(ErrorState::Warning) => {
+                warn!("CAN error counter at the warning limit: check wiring and termination");
+            }
+            News::ErrorState(ErrorState::Active) => info!("CAN controller error active again"),
+            News::Counts(counts) => warn!(
+                "so far: {=u32} SYNC not sent, {=u32} RPDO sent late or not, {=u32} cycles overrun, {=u32} frames not queued, {=u32} receive overruns, {=u32} receive queue full, {=u32} TPDO of wrong length, {=u32} log lines lost",
+                counts.sync_not_sent,
+                counts.rpdo_replaced,
+                counts.cycle_overruns,
+                counts.tx_overflows,
+                counts.rx_overruns,
+                counts.rx_queue_full,
+                counts.tpdo_length,
+                counts.log_full,
+            ),
+        }
+    }
+
+    fn notice(&mut self, known: bool, notice: &Notice) {
+        if !known {
+            warn!("{}: not in the network description", Display2Format(notice));
+        } else if notice.fault().is_some() {
+            self.fault(format_args!("{notice}"));
+        } else {
+            warn!("{}", Display2Format(notice));
+        }
+    }
+
+    fn fault(&mut self, words: core::fmt::Arguments<'_>) {
+        if self.faulted {
+            warn!("{}", Display2Format(&words));
+        } else {
+            error!("{}", Display2Format(&words));
+        }
+        self.faulted = true;
+    }
+
+    /// What the group reports.
+    pub(crate) fn group(&mut self, event: &GroupEvent) {
+        match event {
+            // The controller's state says more.
+            GroupEvent::Fault {
+                cause: FaultCause::NetworkLost,
+                ..
+            } => {
+                warn!("{}", Display2Format(event));
+            }
+            GroupEvent::Fault { .. } => self.fault(format_args!("{event}")),
+            GroupEvent::State {
+                to: GroupState::Standby,
+                ..
+            } => {
+                info!("{}: press B1 to start the motion", Display2Format(event));
+            }
+            GroupEvent::State {
+                to: GroupState::Faulted,
+                ..
+            } => {
+                warn!("{}: reset the board to start again", Display2Format(event));
+            }
+            GroupEvent::ReleaseRefused(_)
+            | GroupEvent::Coasting { .. }
+            | GroupEvent::NotAtRest { .. }
+            | GroupEvent::Lost { .. } => warn!("{}", Display2Format(event)),
+            _ => info!("{}", Display2Format(event)),
+        }
+    }
+}

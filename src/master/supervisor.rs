@@ -1,0 +1,323 @@
+//! Supervision of the nodes by what they say themselves: heartbeat, NMT state,
+//! boot-up, emergencies.
+
+use crate::emcy::{Class, Emcy};
+use crate::frame::Frame;
+use crate::id::NodeId;
+use crate::motion::FaultCause;
+use crate::network::Network;
+use crate::nmt::{Consumer, ErrorControl, Heard, Lost, State};
+use crate::time::{Duration, Instant};
+use core::fmt;
+use heapless::Vec;
+
+/// Consumer heartbeat time in percent of the producer's: the second heartbeat in
+/// a row that is missing by half a period raises the alarm, the first may fall
+/// to the bus.
+const CONSUMER_PERCENT: u32 = 250;
+const HUNDRED: u32 = 100;
+const US_PER_MS: u32 = 1000;
+
+/// Something that a node said, or no longer says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Notice {
+    /// An emergency message (CiA 301, 7.2.7).
+    Emcy {
+        /// Who.
+        node: NodeId,
+        /// What.
+        emcy: Emcy,
+    },
+    /// The heartbeat stayed away (CiA 301, 7.2.8.3.2.2).
+    HeartbeatLost(Lost),
+    /// The heartbeat is back, but the group needs more than that.
+    HeartbeatBack(NodeId),
+    /// A boot-up message after the network was started: the node was reset, or
+    /// lost its supply.
+    BootUp(NodeId),
+    /// Another NMT state than operational after the network was started.
+    NotOperational {
+        /// Who.
+        node: NodeId,
+        /// Its state.
+        state: State,
+    },
+}
+
+impl Notice {
+    /// Who it is about.
+    pub const fn node(&self) -> NodeId {
+        match self {
+            Notice::Emcy { node, .. }
+            | Notice::HeartbeatBack(node)
+            | Notice::BootUp(node)
+            | Notice::NotOperational { node, .. }
+            | Notice::HeartbeatLost(Lost { node, .. }) => *node,
+        }
+    }
+
+    /// Why the group has to stop for it, if it has.
+    pub const fn fault(&self) -> Option<FaultCause> {
+        match self {
+            Notice::Emcy { emcy, .. } => match emcy.code.class() {
+                Class::Reset | Class::Warning => None,
+                Class::Fault => Some(FaultCause::Emergency { code: emcy.code.0 }),
+            },
+            Notice::HeartbeatLost(_) => Some(FaultCause::HeartbeatLost),
+            Notice::HeartbeatBack(_) => None,
+            Notice::BootUp(_) | Notice::NotOperational { .. } => Some(FaultCause::LeftOperational),
+        }
+    }
+}
+
+impl fmt::Display for Notice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "node {}: ", self.node())?;
+        match self {
+            Notice::Emcy { emcy, .. } => match emcy.code.class() {
+                Class::Reset => write!(f, "emergency {}", emcy.code),
+                Class::Warning => {
+                    write!(f, "emergency {}, a warning: the drive goes on", emcy.code)
+                }
+                Class::Fault => write!(
+                    f,
+                    "emergency {}, error register {}; remove the cause, then reset the board",
+                    emcy.code, emcy.register
+                ),
+            },
+            Notice::HeartbeatLost(lost) => write!(
+                f,
+                "heartbeat lost, last state {}; check its cable and supply, then reset the board",
+                lost.last
+            ),
+            Notice::HeartbeatBack(_) => f.write_str("heartbeat is back; reset the board to use it"),
+            Notice::BootUp(_) => f.write_str(
+                "booted again, so it was reset or lost its supply; check that, then reset the board",
+            ),
+            Notice::NotOperational { state, .. } => write!(
+                f,
+                "went to NMT {state} by itself or by another master; reset the board to start again"
+            ),
+        }
+    }
+}
+
+/// A notice, and the axis that it is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Report {
+    /// Counted from 0; `None` for a node that the network does not name.
+    pub axis: Option<usize>,
+    /// What happened.
+    pub notice: Notice,
+}
+
+#[derive(Debug)]
+struct Watched {
+    consumer: Consumer,
+    /// That it is not operational has been reported.
+    reported: bool,
+}
+
+/// Supervises up to `N` nodes.
+#[derive(Debug)]
+pub struct Supervisor<const N: usize> {
+    nodes: Vec<Watched, N>,
+    /// The network was started: whoever is not operational now is a fault.
+    armed: bool,
+}
+
+impl<const N: usize> Supervisor<N> {
+    /// Supervises the first `N` nodes of `network`. While it boots, boot-up
+    /// messages and states are what they should be; [`arm`](Self::arm) ends
+    /// that.
+    pub fn new(network: &Network) -> Supervisor<N> {
+        let watched = network.nodes.iter().take(N).map(|node| {
+            let producer_us = u32::from(node.heartbeat_ms) * US_PER_MS;
+            let time = Duration::from_micros(producer_us / HUNDRED * CONSUMER_PERCENT);
+            Watched {
+                consumer: Consumer::new(node.id, time),
+                reported: false,
+            }
+        });
+        Supervisor {
+            nodes: watched.collect(),
+            armed: false,
+        }
+    }
+
+    /// The network runs: from now on every node has to stay operational.
+    pub fn arm(&mut self) {
+        self.armed = true;
+    }
+
+    /// Whether the heartbeat of any node is lost.
+    pub fn any_lost(&self) -> bool {
+        self.nodes.iter().any(|node| node.consumer.is_lost())
+    }
+
+    /// Takes in a frame of error control or an emergency.
+    pub fn on_frame(&mut self, frame: &Frame, now: Instant) -> Option<Report> {
+        if let Some((node, emcy)) = Emcy::decode(frame) {
+            let axis = self.nodes.iter().position(|w| w.consumer.node() == node);
+            let notice = Notice::Emcy { node, emcy };
+            return Some(Report { axis, notice });
+        }
+        let ErrorControl { node, state, .. } = ErrorControl::decode(frame)?;
+        let armed = self.armed;
+        let (axis, watched) = self
+            .nodes
+            .iter_mut()
+            .enumerate()
+            .find(|(_, watched)| watched.consumer.node() == node)?;
+        let was_lost = watched.consumer.is_lost();
+        let heard = watched.consumer.heard(state, now);
+        let notice = if was_lost && armed {
+            // It was reported as lost; whatever it is now cannot be worse.
+            watched.reported = true;
+            Notice::HeartbeatBack(node)
+        } else if !armed || watched.reported {
+            return None;
+        } else {
+            match heard {
+                Heard::BootUp { .. } => Notice::BootUp(node),
+                _ if state != State::Operational => Notice::NotOperational { node, state },
+                _ => return None,
+            }
+        };
+        watched.reported = true;
+        Some(Report {
+            axis: Some(axis),
+            notice,
+        })
+    }
+
+    /// Looks for heartbeats that stay away: to be called every millisecond,
+    /// until it returns `None`.
+    pub fn poll(&mut self, now: Instant) -> Option<Report> {
+        self.nodes
+            .iter_mut()
+            .enumerate()
+            .find_map(|(axis, watched)| {
+                let lost = watched.consumer.poll(now)?;
+                Some(Report {
+                    axis: Some(axis),
+                    notice: Notice::HeartbeatLost(lost),
+                })
+            })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::emcy::{EmcyCode, ErrorRegister};
+    use crate::network::sample::SIX_EPOS4;
+    use std::string::ToString;
+
+    const NODE: NodeId = NodeId::constant::<3>();
+
+    fn at(ms: u64) -> Instant {
+        Instant::from_micros(ms * 1000)
+    }
+
+    fn heartbeat(state: State) -> Frame {
+        ErrorControl::heartbeat(NODE, state).frame()
+    }
+
+    fn running() -> Supervisor<6> {
+        let mut supervisor = Supervisor::new(&SIX_EPOS4);
+        for (ms, state) in [
+            (0, State::Initialising),
+            (100, State::PreOperational),
+            (200, State::Operational),
+        ] {
+            assert_eq!(supervisor.on_frame(&heartbeat(state), at(ms)), None);
+        }
+        supervisor.arm();
+        supervisor
+    }
+
+    fn only(supervisor: &mut Supervisor<6>, frame: &Frame, ms: u64) -> Notice {
+        let report = supervisor.on_frame(frame, at(ms)).unwrap();
+        assert_eq!(report.axis, Some(2));
+        report.notice
+    }
+
+    #[test]
+    fn a_steady_heartbeat_is_no_news() {
+        let mut supervisor = running();
+        for ms in (300..3000).step_by(100) {
+            let frame = heartbeat(State::Operational);
+            assert_eq!(supervisor.on_frame(&frame, at(ms)), None);
+            assert_eq!(supervisor.poll(at(ms + 99)), None);
+        }
+        assert!(!supervisor.any_lost());
+    }
+
+    #[test]
+    fn a_lost_heartbeat_is_reported_once() {
+        let mut supervisor = running();
+        assert_eq!(supervisor.poll(at(449)), None);
+        let report = supervisor.poll(at(450)).unwrap();
+        assert_eq!(report.axis, Some(2));
+        assert_eq!(report.notice.fault(), Some(FaultCause::HeartbeatLost));
+        assert_eq!(supervisor.poll(at(1000)), None);
+        assert!(supervisor.any_lost());
+        let notice = only(&mut supervisor, &heartbeat(State::Operational), 1100);
+        assert_eq!(notice.fault(), None);
+    }
+
+    #[test]
+    fn a_reset_in_operation_is_a_fault() {
+        let mut supervisor = running();
+        let notice = only(&mut supervisor, &heartbeat(State::Initialising), 300);
+        assert_eq!(notice, Notice::BootUp(NODE));
+        assert_eq!(notice.fault(), Some(FaultCause::LeftOperational));
+        let frame = heartbeat(State::PreOperational);
+        assert_eq!(supervisor.on_frame(&frame, at(400)), None);
+    }
+
+    #[test]
+    fn leaving_operational_is_a_fault() {
+        for state in [State::PreOperational, State::Stopped, State::Other(0x33)] {
+            let mut supervisor = running();
+            let notice = only(&mut supervisor, &heartbeat(state), 300);
+            assert_eq!(notice, Notice::NotOperational { node: NODE, state });
+            assert_eq!(notice.fault(), Some(FaultCause::LeftOperational));
+        }
+    }
+
+    #[test]
+    fn an_emergency_is_a_fault_unless_it_is_known_not_to_be() {
+        for (code, fault) in [
+            (0x0000, false),
+            (0xFF01, false),
+            (0x8611, true),
+            (0xABCD, true),
+        ] {
+            let mut supervisor = running();
+            let emcy = Emcy::new(EmcyCode(code), ErrorRegister::GENERIC);
+            let notice = only(&mut supervisor, &emcy.frame(NODE), 300);
+            let expected = fault.then_some(FaultCause::Emergency { code });
+            assert_eq!(notice.fault(), expected);
+        }
+    }
+
+    #[test]
+    fn an_emergency_of_a_stranger_has_no_axis() {
+        let mut supervisor = running();
+        let emcy = Emcy::new(EmcyCode::GENERIC, ErrorRegister::GENERIC);
+        let frame = emcy.frame(NodeId::constant::<99>());
+        assert_eq!(supervisor.on_frame(&frame, at(300)).unwrap().axis, None);
+    }
+
+    #[test]
+    fn notices_say_what_to_do() {
+        let emcy = Emcy::new(EmcyCode::FOLLOWING_ERROR, ErrorRegister::MANUFACTURER);
+        assert_eq!(
+            Notice::Emcy { node: NODE, emcy }.to_string(),
+            "node 3: emergency 8611h (following error), error register manufacturer; \
+             remove the cause, then reset the board"
+        );
+    }
+}
