@@ -1,5 +1,6 @@
 //! Simulator.
 
+pub mod board;
 pub mod bus;
 pub mod drive;
 pub mod frame;

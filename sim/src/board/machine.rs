@@ -1,0 +1,603 @@
+//! The board: core, memories and peripherals run together.
+
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex};
+
+use rsemu::core::device::{Device as _, ResetKind};
+use rsemu::cpu::arm::v7m::sys::Exception;
+use rsemu::cpu::arm::v7m::{ArmV7m, Config, Regs};
+
+use super::clock::CoreClock;
+use super::diagnostics::{Diagnostic, DiagnosticKind};
+use super::fault::{FaultKind, FaultReport};
+use super::gpio::Pin;
+use super::image::{BoardError, Image, ImageSize};
+use super::irq::{IrqRouter, bits};
+use super::measure::{BoardStats, Measure, ResetRecord};
+use super::memory::{FLASH_BASE, Memory, POWER_ON_WORD, Shared, lock};
+use super::rcc::ResetCause;
+use super::rtt;
+use super::soc::{ClockErrors, Soc, TIM2_IRQ, irq_name};
+use crate::bus::{BitTiming, Event, Offer};
+use crate::time::Time;
+
+/// How a board is made.
+#[derive(Debug, Clone)]
+pub struct BoardOptions {
+    /// Error of the 24 MHz crystal in parts per million; the core and the CAN
+    /// bit follow it.
+    pub clock_error_ppm: f64,
+    /// Error of the internal 16 MHz oscillator in percent (start-up only).
+    pub hsi_error_percent: f64,
+    /// Error of the internal 32 kHz oscillator in percent (the watchdog).
+    pub lsi_error_percent: f64,
+    /// COB-ID whose request after TIM2's update is timed.
+    pub sync_cob_id: u16,
+}
+
+impl Default for BoardOptions {
+    fn default() -> Self {
+        const SYNC: u16 = 0x080;
+        Self {
+            clock_error_ppm: 0.0,
+            hsi_error_percent: 0.0,
+            lsi_error_percent: 0.0,
+            sync_cob_id: SYNC,
+        }
+    }
+}
+
+/// Why [`Board::run_until`] came back.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Stop {
+    /// The moment is reached.
+    Reached,
+    /// What the board offers to a bus, or its bit timing, may have changed;
+    /// ask [`Board::can_timing`] and [`Board::can_offer`], then go on.
+    CanChanged,
+    /// The program has come to a bad end. Going on is possible: the watchdog
+    /// may still reset it.
+    Fault(Box<FaultReport>),
+}
+
+/// A light on the board.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Led {
+    /// LD2 on PA5: the RUN LED.
+    Run,
+    /// The ERR LED on PB0 (Arduino A3).
+    Error,
+}
+
+const LD2: Pin = Pin::new('A', 5);
+const ERR: Pin = Pin::new('B', 0);
+const B1: Pin = Pin::new('C', 13);
+/// STM32G4 implements four priority bits.
+const PRIORITY_BITS: u8 = 4;
+/// How often a busy core is looked at for SYSRESETREQ, and the RTT buffer is
+/// emptied, in cycles.
+const POLL_CYCLES: u64 = 3_400;
+const RTT_CYCLES: u64 = 85_000;
+/// From the reset condition to the first instruction (data sheet, reset
+/// temporisation), in cycles of HSI.
+const RESET_CYCLES: u64 = 800;
+/// A line that is high for this long without being enabled in the NVIC is
+/// taken for a mistake.
+const ROUTING_CYCLES: u64 = 1_700_000;
+/// The emulator charges the eight data accesses of stacking on top of the
+/// twelve cycles that stacking takes as a whole, and those of unstacking on top
+/// of the ten; a step that changes the active exception and takes this long
+/// stacked or unstacked (a tail-chained one takes less).
+const STACKING_STEP_CYCLES: u64 = 18;
+const STACKING_EXCESS_CYCLES: u64 = 8;
+const LOCKED_PC: u32 = 0xFFFF_FFFE;
+const HARD_FAULT: u32 = 3;
+const EXCEPTION_MASK: u32 = 0x1FF;
+
+/// The emulated board.
+#[derive(Debug)]
+pub struct Board {
+    core: ArmV7m,
+    soc: Arc<Mutex<Soc>>,
+    shared: Arc<Shared>,
+    memory: Memory,
+    image: Image,
+    clock: CoreClock,
+    cycle: u64,
+    /// The peripherals need nothing before this cycle.
+    next_event: u64,
+    next_poll: u64,
+    next_rtt: u64,
+    asleep: bool,
+    locked: bool,
+    /// Something may have woken the core.
+    poke: bool,
+    in_fault: bool,
+    /// Held in reset (or without power) since then.
+    held: Option<(Time, ResetCause)>,
+    irq: IrqRouter,
+    unrouted: Vec<(u8, u64)>,
+    measure: Measure,
+    exception: u32,
+    basepri: u8,
+    sync_priority: u8,
+    stats_from: u64,
+    rtt_out: Vec<u8>,
+    diagnostics: Vec<Diagnostic>,
+    diagnostics_total: u64,
+    pc: u32,
+}
+
+impl Board {
+    /// Flashes the ELF image `elf` into a board and switches it on.
+    ///
+    /// # Errors
+    ///
+    /// If the file is not an image for this microcontroller.
+    pub fn new(elf: &[u8], options: BoardOptions) -> Result<Self, BoardError> {
+        Self::from_image(Image::parse(elf)?, &options)
+    }
+
+    pub(super) fn from_image(image: Image, options: &BoardOptions) -> Result<Self, BoardError> {
+        const PPB_PER_PPM: f64 = 1e3;
+        const PPB_PER_PERCENT: f64 = 1e7;
+        let errors = ClockErrors {
+            hse_ppb: (options.clock_error_ppm * PPB_PER_PPM) as i64,
+            hsi_ppb: (options.hsi_error_percent * PPB_PER_PERCENT) as i64,
+            lsi_ppb: (options.lsi_error_percent * PPB_PER_PERCENT) as i64,
+        };
+        let soc = Soc::new(errors, options.sync_cob_id);
+        let clock = soc.clock;
+        let soc = Arc::new(Mutex::new(soc));
+        let shared = Arc::new(Shared::default());
+        let (memory, space) = Memory::new(&soc, &shared)?;
+        for (address, bytes) in &image.segments {
+            memory.program(*address, bytes)?;
+        }
+        let config = Config::CORTEX_M4F
+            .with_reset_vtor(FLASH_BASE)
+            .with_priority_bits(PRIORITY_BITS);
+        let core = ArmV7m::new(config);
+        core.attach_space(Arc::new(space));
+        let mut board = Self {
+            core,
+            soc,
+            shared,
+            memory,
+            image,
+            clock,
+            cycle: 0,
+            next_event: 0,
+            next_poll: 0,
+            next_rtt: 0,
+            asleep: false,
+            locked: false,
+            poke: false,
+            in_fault: false,
+            held: None,
+            irq: IrqRouter::new(),
+            unrouted: Vec::new(),
+            measure: Measure::default(),
+            exception: 0,
+            basepri: 0,
+            sync_priority: 0,
+            stats_from: 0,
+            rtt_out: Vec::new(),
+            diagnostics: Vec::new(),
+            diagnostics_total: 0,
+            pc: 0,
+        };
+        board.measure.reset(ResetRecord {
+            at: Time::ZERO,
+            cause: ResetCause::PowerOn,
+        });
+        Ok(board)
+    }
+
+    /// The moment that the board has reached.
+    #[must_use]
+    pub fn now(&self) -> Time {
+        match self.held {
+            Some((since, _)) => since,
+            None => self.clock.time_of(self.cycle),
+        }
+    }
+
+    /// Lets the board run until `t` (it may overshoot by one instruction), or
+    /// until what it offers to a bus changes, or until it faults.
+    pub fn run_until(&mut self, t: Time) -> Stop {
+        if let Some((now, _)) = &mut self.held {
+            *now = t.max(*now);
+            return if lock(&self.soc).take_can_changed() {
+                Stop::CanChanged
+            } else {
+                Stop::Reached
+            };
+        }
+        let mut target = self.clock.cycle_at(t);
+        loop {
+            if self.cycle >= self.next_event || self.shared.dirty.load(Ordering::Relaxed) {
+                let changed = self.service();
+                target = self.clock.cycle_at(t);
+                if changed {
+                    return Stop::CanChanged;
+                }
+            }
+            if self.cycle >= target {
+                return Stop::Reached;
+            }
+            if self.asleep && !self.poke {
+                self.sleep_to(self.next_event.min(target));
+                continue;
+            }
+            if let Some(stop) = self.step() {
+                return stop;
+            }
+        }
+    }
+
+    /// One instruction or exception entry.
+    #[inline]
+    fn step(&mut self) -> Option<Stop> {
+        let mut used = self.core.step();
+        let regs = self.core.regs();
+        let pc = regs.r[15];
+        let exception = regs.xpsr & EXCEPTION_MASK;
+        if exception != self.exception {
+            self.exception = exception;
+            if used >= STACKING_STEP_CYCLES {
+                used -= STACKING_EXCESS_CYCLES;
+            }
+        }
+        self.cycle += used;
+        self.shared.cycle.store(self.cycle, Ordering::Relaxed);
+        self.shared.pc.store(pc, Ordering::Relaxed);
+        if regs.basepri != self.basepri {
+            self.basepri = regs.basepri;
+            let exception = Exception(u16::from(TIM2_IRQ) + Exception::IRQ0.0);
+            self.sync_priority = self
+                .core
+                .with_sys(|sys| sys.priority[usize::from(exception.0)]);
+        }
+        if pc == self.pc && used == 1 {
+            return self.stands_still(&regs);
+        }
+        self.pc = pc;
+        self.asleep = false;
+        self.poke = false;
+        self.measure.step(
+            self.cycle,
+            used,
+            &regs,
+            &mut self.irq,
+            &self.core,
+            self.sync_priority,
+        );
+        if (exception == HARD_FAULT) != self.in_fault || pc == LOCKED_PC {
+            return self.fault(&regs, exception);
+        }
+        None
+    }
+
+    /// The program counter did not move in a step of one cycle: the core
+    /// sleeps, or it is locked up.
+    #[cold]
+    fn stands_still(&mut self, regs: &Regs) -> Option<Stop> {
+        self.asleep = self.core.is_asleep() || self.locked;
+        self.poke = false;
+        if !self.asleep && self.core.is_locked_up() {
+            return self.fault(regs, regs.xpsr & EXCEPTION_MASK);
+        }
+        None
+    }
+
+    #[cold]
+    fn fault(&mut self, regs: &Regs, exception: u32) -> Option<Stop> {
+        let kind = if self.core.is_locked_up() {
+            self.locked = true;
+            self.asleep = true;
+            FaultKind::LockUp
+        } else {
+            self.in_fault = exception == HARD_FAULT;
+            if !self.in_fault {
+                return None;
+            }
+            FaultKind::HardFault
+        };
+        let at = self.now();
+        let report = FaultReport::of(&self.core, regs, &self.memory, &self.image, at, kind);
+        Some(Stop::Fault(Box::new(report)))
+    }
+
+    /// Passes over the cycles in which the core sleeps.
+    fn sleep_to(&mut self, cycle: u64) {
+        const ENABLE: u32 = 1 << 0;
+        const TICKINT: u32 = 1 << 1;
+        let mut cycles = cycle.saturating_sub(self.cycle);
+        if self.locked {
+            self.cycle += cycles;
+            return;
+        }
+        // SysTick counts on in sleep; the core only ticks it while it steps.
+        let (woken, skipped) = self.core.with_sys(|sys| {
+            if sys.syst_csr & ENABLE == 0 {
+                return (false, cycles);
+            }
+            let wraps = sys.syst_csr & TICKINT != 0;
+            let left = match sys.syst_cvr {
+                0 => u64::from(sys.syst_rvr) + 1,
+                value => u64::from(value),
+            };
+            if wraps {
+                cycles = cycles.min(left);
+            }
+            let wrapped = sys.tick_systick(cycles) && wraps;
+            if wrapped {
+                sys.set_pending(Exception::SYSTICK, true);
+            }
+            (wrapped, cycles)
+        });
+        self.cycle += skipped;
+        self.measure.slept(skipped);
+        self.shared.cycle.store(self.cycle, Ordering::Relaxed);
+        self.poke |= woken;
+    }
+
+    /// Brings the peripherals up to date and the core's interrupt inputs with
+    /// them. True if a bus may be concerned.
+    fn service(&mut self) -> bool {
+        self.shared.dirty.store(false, Ordering::Relaxed);
+        let mut soc = lock(&self.soc);
+        soc.advance(self.cycle);
+        let request = if self.cycle >= self.next_poll && self.core.reset_requested() {
+            Some(ResetCause::Software)
+        } else {
+            None
+        };
+        if let Some(cause) = soc.take_reset_request().or(request) {
+            drop(soc);
+            let at = self.now();
+            self.reset(cause, at);
+            return lock(&self.soc).take_can_changed();
+        }
+        let raised = self.cycle.min(self.next_event.max(1));
+        let up = self
+            .irq
+            .update(soc.irq_levels(), self.cycle, raised, &self.core);
+        self.poke |= up != 0;
+        self.clock = soc.clock;
+        self.next_event = soc.next_event().min(self.irq.next_delivery());
+        let changed = soc.take_can_changed();
+        drop(soc);
+        self.watch_routing(up);
+        self.read_diagnostics();
+        let deadline = self.unrouted.iter().map(|&(_, deadline)| deadline).min();
+        self.next_event = self.next_event.min(deadline.unwrap_or(u64::MAX));
+        if self.cycle >= self.next_rtt {
+            self.next_rtt = self.cycle + RTT_CYCLES;
+            self.read_rtt();
+        }
+        if !self.asleep {
+            self.next_poll = self.cycle + POLL_CYCLES;
+            self.next_event = self.next_event.min(self.next_poll);
+        }
+        changed
+    }
+
+    /// Notes lines that stay high while the NVIC does not enable them.
+    fn watch_routing(&mut self, up: u128) {
+        let enabled = |irq: u8| {
+            let exception = Exception(u16::from(irq) + Exception::IRQ0.0);
+            self.core.with_sys(|sys| sys.is_enabled(exception))
+        };
+        for irq in bits(up) {
+            if !enabled(irq) && !self.unrouted.iter().any(|(known, _)| *known == irq) {
+                self.unrouted.push((irq, self.cycle + ROUTING_CYCLES));
+            }
+        }
+        if self.unrouted.is_empty() {
+            return;
+        }
+        let (cycle, driven) = (self.cycle, self.irq.driven());
+        self.unrouted
+            .retain(|&(irq, _)| driven & 1 << irq != 0 && !enabled(irq));
+        let at = self.clock.time_of(cycle);
+        for &(irq, deadline) in &self.unrouted {
+            if deadline <= cycle {
+                let text = format!(
+                    "interrupt {} is requested, but the NVIC does not enable it: nobody serves it",
+                    irq_name(irq)
+                );
+                lock(&self.soc)
+                    .log
+                    .note(at, 0, DiagnosticKind::InterruptRouting, text);
+            }
+        }
+        self.unrouted.retain(|&(_, deadline)| deadline > cycle);
+    }
+
+    fn read_diagnostics(&mut self) {
+        let soc = lock(&self.soc);
+        let total = soc.log.total();
+        if total != self.diagnostics_total {
+            self.diagnostics_total = total;
+            self.diagnostics.clear();
+            self.diagnostics.extend_from_slice(soc.log.entries());
+        }
+    }
+
+    fn read_rtt(&mut self) {
+        if let Some(block) = self.image.rtt {
+            rtt::drain(&self.memory, block, &mut self.rtt_out);
+        }
+    }
+
+    /// Resets core and peripherals at `at`.
+    fn reset(&mut self, cause: ResetCause, at: Time) {
+        self.read_rtt();
+        if cause == ResetCause::PowerOn {
+            self.memory.power_on();
+        }
+        let mut soc = lock(&self.soc);
+        soc.reset(cause, self.cycle, at);
+        self.clock = soc.clock;
+        drop(soc);
+        // A warm reset of the core leaves NVIC enables, priorities and SCB as
+        // they were; the hardware resets them. A cold one starts afresh.
+        self.core.reset(ResetKind::Cold);
+        self.irq.reset();
+        self.unrouted.clear();
+        self.measure.reset(ResetRecord { at, cause });
+        self.cycle += RESET_CYCLES;
+        self.shared.cycle.store(self.cycle, Ordering::Relaxed);
+        self.next_event = self.cycle;
+        self.next_poll = 0;
+        self.asleep = false;
+        self.locked = false;
+        self.in_fault = false;
+        self.exception = 0;
+        self.basepri = 0;
+        self.pc = 0;
+    }
+
+    /// Pulls NRST low: core and peripherals are in reset until
+    /// [`release_reset`](Self::release_reset); RAM keeps its content.
+    pub fn hold_in_reset(&mut self) {
+        self.hold(ResetCause::Pin);
+    }
+
+    /// Lets go of NRST, or switches the supply on again.
+    pub fn release_reset(&mut self) {
+        if let Some((at, cause)) = self.held.take() {
+            self.reset(cause, at);
+        }
+    }
+
+    /// Takes the supply away until [`release_reset`](Self::release_reset): RAM
+    /// loses its content.
+    pub fn power_off(&mut self) {
+        self.hold(ResetCause::PowerOn);
+    }
+
+    fn hold(&mut self, cause: ResetCause) {
+        if self.held.is_none() {
+            let at = self.now();
+            self.read_rtt();
+            lock(&self.soc).reset(cause, self.cycle, at);
+            self.held = Some((at, cause));
+        }
+    }
+
+    /// Whether NRST is held low or the supply is off.
+    #[must_use]
+    pub const fn is_held(&self) -> bool {
+        self.held.is_some()
+    }
+
+    /// Bit timing of FDCAN`instance + 1` as the board's clocks give it; `None`
+    /// while it takes no part in the bus.
+    #[must_use]
+    pub fn can_timing(&self, instance: usize) -> Option<BitTiming> {
+        lock(&self.soc).can_timing(instance)
+    }
+
+    /// What FDCAN`instance + 1` would send next.
+    #[must_use]
+    pub fn can_offer(&self, instance: usize) -> Option<Offer> {
+        lock(&self.soc).can_offer(instance)
+    }
+
+    /// Hands an event of the bus to FDCAN`instance + 1`.
+    pub fn can_event(&mut self, instance: usize, event: &Event) {
+        lock(&self.soc).can_event(instance, event, self.cycle);
+        self.shared.dirty.store(true, Ordering::Relaxed);
+    }
+
+    /// Presses or releases B1.
+    pub fn set_button(&mut self, pressed: bool) {
+        lock(&self.soc).drive(B1, pressed);
+        self.shared.dirty.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether a light is on.
+    #[must_use]
+    pub fn led(&self, led: Led) -> bool {
+        lock(&self.soc).is_high(match led {
+            Led::Run => LD2,
+            Led::Error => ERR,
+        })
+    }
+
+    /// Appends what the program has written to RTT up-channel 0.
+    pub fn drain_rtt(&mut self, out: &mut Vec<u8>) {
+        self.read_rtt();
+        out.append(&mut self.rtt_out);
+    }
+
+    /// Delivers interrupt `irq` late from now on: by a random number of cycles
+    /// up to `max_cycles`, from `seed`. 0 ends it.
+    pub fn delay_irq(&mut self, irq: u8, max_cycles: u64, seed: u64) {
+        self.irq.delay(irq, max_cycles, seed);
+    }
+
+    /// Does not deliver interrupt `irq` from now on, or delivers it again.
+    pub fn block_irq(&mut self, irq: u8, blocked: bool) {
+        self.irq.block(irq, blocked);
+        self.shared.dirty.store(true, Ordering::Relaxed);
+    }
+
+    /// Mistakes of the program, in the order of first occurrence.
+    #[must_use]
+    pub fn diagnostics(&self) -> &[Diagnostic] {
+        &self.diagnostics
+    }
+
+    /// Sizes of the image.
+    #[must_use]
+    pub const fn image_size(&self) -> ImageSize {
+        self.image.size
+    }
+
+    /// The function that a program address lies in, with the offset.
+    #[must_use]
+    pub fn function_at(&self, address: u32) -> Option<String> {
+        self.image.function_at(address)
+    }
+
+    /// The word of flash or RAM at `address`, as a debug probe reads it.
+    #[must_use]
+    pub fn word(&self, address: u32) -> Option<u32> {
+        self.memory.word(address)
+    }
+
+    /// Starts all figures anew, except the stack's and the resets.
+    pub fn clear_stats(&mut self) {
+        self.measure.clear();
+        self.stats_from = self.cycle;
+        lock(&self.soc).sync.clear();
+    }
+
+    /// What has been measured.
+    #[must_use]
+    pub fn stats(&self) -> BoardStats {
+        let mut stats = BoardStats {
+            cycles: self.cycle - self.stats_from,
+            ..BoardStats::default()
+        };
+        self.measure.report(&mut stats);
+        {
+            let soc = lock(&self.soc);
+            stats.sync = soc.sync.figures();
+            stats.rx_overruns = soc.can_lost();
+        }
+        let top = self.memory.word(FLASH_BASE).unwrap_or(0);
+        let bottom = self.image.stack_bottom(top);
+        stats.stack_size_bytes = top - bottom;
+        let untouched = (bottom..top)
+            .step_by(4)
+            .take_while(|&at| self.memory.word(at) == Some(POWER_ON_WORD))
+            .count();
+        stats.stack_high_water_bytes = stats.stack_size_bytes - 4 * untouched as u32;
+        stats
+    }
+}
