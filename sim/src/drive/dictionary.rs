@@ -4,10 +4,11 @@
 use super::config::Identity;
 use super::errors::Errors;
 use super::modes::Mode;
-use super::objects::{self, OBJECT_COUNT, PDOS, TABLE};
-use super::pdo::{self, Direction};
+use super::objects::{OBJECT_COUNT, PDOS, TABLE};
+use super::pdo;
 use canmaster::id::{Address, FunctionCode};
 use canmaster::od::{Chunk, Entry, ObjectDictionary, Value, Values};
+use canmaster::pdo::{Direction, PdoCobId, RPDO_COMMUNICATION, TPDO_COMMUNICATION};
 use canmaster::sdo::AbortCode;
 use canmaster::{CobId, NodeId};
 
@@ -17,10 +18,6 @@ const SAVE: u32 = u32::from_le_bytes(*b"save");
 const LOAD: u32 = u32::from_le_bytes(*b"load");
 /// Objects that a reset of the communication sets back.
 const COMMUNICATION_AREA: (u16, u16) = (0x1000, 0x1FFF);
-/// TPDO identifier: no RTR.
-const NO_RTR: i64 = 1 << 30;
-/// PDO does not exist.
-const INVALID: i64 = 1 << 31;
 /// rpm, without prefix (60A9h).
 const UNIT_RPM: u32 = 0x00B4_4700;
 /// Codes of 2001h: LSS bit rates and 9, automatic.
@@ -61,6 +58,14 @@ impl Dictionary {
             operational: false,
             refused: Vec::new(),
             written: Vec::new(),
+        }
+    }
+
+    /// It is another device, from now on.
+    pub fn set_identity(&mut self, identity: Identity) {
+        self.identity = identity;
+        for values in [&mut self.values, &mut self.stored] {
+            put_identity(values, identity);
         }
     }
 
@@ -110,20 +115,6 @@ impl Dictionary {
     /// The entries written since the last call, in order.
     pub fn take_written(&mut self) -> Vec<Address> {
         std::mem::take(&mut self.written)
-    }
-
-    /// A value that arrived in an RPDO. What the entry does not accept is
-    /// passed over: a PDO has no answer.
-    pub fn receive(&mut self, at: Address, data: &[u8]) {
-        let Ok(entry) = self.values.entry(at) else {
-            return;
-        };
-        let Ok(value) = Value::from_bytes(entry.data_type, data) else {
-            return;
-        };
-        if entry.in_range(value).is_ok() && self.accept(at, value).is_ok() {
-            self.written.push(at);
-        }
     }
 
     /// The rules of single objects, and the new value.
@@ -208,6 +199,27 @@ impl ObjectDictionary for Dictionary {
     }
 }
 
+/// The dictionary as an RPDO writes it: what an entry does not accept is passed
+/// over by the caller, since a PDO has no answer, and refusals that a test
+/// ordered are for SDO only.
+pub(super) struct ByPdo<'a>(pub(super) &'a mut Dictionary);
+
+impl ObjectDictionary for ByPdo<'_> {
+    fn entry(&self, at: Address) -> Result<Entry, AbortCode> {
+        self.0.entry(at)
+    }
+
+    fn get(&mut self, at: Address) -> Result<Value, AbortCode> {
+        self.0.get(at)
+    }
+
+    fn set(&mut self, at: Address, value: Value) -> Result<(), AbortCode> {
+        self.0.accept(at, value)?;
+        self.0.written.push(at);
+        Ok(())
+    }
+}
+
 /// The values of a drive that was never configured.
 fn factory(node: NodeId, identity: Identity) -> Values<OBJECT_COUNT> {
     let mut values = Values::new(TABLE);
@@ -216,29 +228,38 @@ fn factory(node: NodeId, identity: Identity) -> Values<OBJECT_COUNT> {
         let exists = values.put(index, sub, number);
         debug_assert!(exists, "{index:04X}h:{sub:02X} is in the table");
     };
-    put(0x1000, 0, identity.device_type.into());
     put(0x1014, 0, of(FunctionCode::Emcy));
-    put(0x1018, 1, identity.vendor.into());
-    put(0x1018, 2, identity.product.into());
-    put(0x1018, 3, identity.revision.into());
-    put(0x1018, 4, identity.serial.into());
     put(0x1200, 1, of(FunctionCode::SdoRequest));
     put(0x1200, 2, of(FunctionCode::SdoResponse));
     put(0x2000, 0, node.get().into());
     for number in 0..PDOS {
-        let off = if number == 0 { 0 } else { INVALID };
-        put(
-            objects::RPDO_COMMUNICATION + number,
-            1,
-            i64::from(Direction::Receive.default_id(number, node)),
-        );
-        put(
-            objects::TPDO_COMMUNICATION + number,
-            1,
-            i64::from(Direction::Transmit.default_id(number, node)) | NO_RTR | off,
-        );
+        let receive = PdoCobId::valid(pdo::default_id(Direction::Receive, number, node));
+        let transmit = PdoCobId::valid(pdo::default_id(Direction::Transmit, number, node));
+        let transmit = transmit.without_rtr();
+        // Of the TPDOs only the first is on.
+        let transmit = if number == 0 {
+            transmit
+        } else {
+            transmit.invalid()
+        };
+        put(RPDO_COMMUNICATION + number, 1, receive.0.into());
+        put(TPDO_COMMUNICATION + number, 1, transmit.0.into());
     }
+    put_identity(&mut values, identity);
     values
+}
+
+fn put_identity(values: &mut Values<OBJECT_COUNT>, identity: Identity) {
+    for (index, sub, number) in [
+        (0x1000, 0, identity.device_type),
+        (0x1018, 1, identity.vendor),
+        (0x1018, 2, identity.product),
+        (0x1018, 3, identity.revision),
+        (0x1018, 4, identity.serial),
+    ] {
+        let exists = values.put(index, sub, number.into());
+        debug_assert!(exists, "{index:04X}h:{sub:02X} is in the table");
+    }
 }
 
 fn check(good: bool, code: AbortCode) -> Result<(), AbortCode> {

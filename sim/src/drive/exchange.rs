@@ -3,12 +3,13 @@
 use super::config::DriveFault;
 use super::dictionary::Dictionary;
 use super::objects::PDOS;
-use super::pdo::{Direction, EVERY_SYNC, ON_CHANGE, Pdo};
+use super::pdo::{EVERY_SYNC, Pdo};
 use super::{Drive, Job, errors};
 use crate::frame::WireFrame;
 use crate::time::Time;
-use canmaster::Frame;
 use canmaster::nmt::Service;
+use canmaster::pdo::{Direction, Received, RpdoState};
+use canmaster::{CobId, Frame};
 
 /// Unit of the inhibit time, microseconds.
 const INHIBIT_US: u64 = 100;
@@ -21,17 +22,17 @@ struct Transmitted {
     inhibited_until: Time,
 }
 
-/// An RPDO whose data waits for the SYNC.
+/// An RPDO with the data that waits for the SYNC.
 #[derive(Clone, Debug)]
-struct Received {
+struct Reception {
     pdo: Pdo,
-    pending: Option<Vec<u8>>,
+    state: RpdoState,
 }
 
 /// The PDOs that exist, in the order of their numbers.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Exchange {
-    receive: Vec<Received>,
+    receive: Vec<Reception>,
     transmit: Vec<Transmitted>,
 }
 
@@ -40,7 +41,10 @@ impl Exchange {
     pub(super) fn reload(&mut self, od: &Dictionary) {
         let all = |direction| (0..PDOS).filter_map(move |n| Pdo::read(od, direction, n));
         self.receive = all(Direction::Receive)
-            .map(|pdo| Received { pdo, pending: None })
+            .map(|pdo| Reception {
+                pdo,
+                state: RpdoState::new(),
+            })
             .collect();
         self.transmit = all(Direction::Transmit)
             .map(|pdo| Transmitted {
@@ -58,8 +62,8 @@ impl Exchange {
 
     /// Data that waits for a SYNC is dropped.
     pub(super) fn clear_pending(&mut self) {
-        for received in &mut self.receive {
-            received.pending = None;
+        for reception in &mut self.receive {
+            reception.state.reset();
         }
     }
 
@@ -74,7 +78,7 @@ impl Exchange {
     pub(super) fn has_events(&self) -> bool {
         self.transmit
             .iter()
-            .any(|t| t.pdo.transmission == ON_CHANGE)
+            .any(|t| t.pdo.transmission.is_event_driven())
     }
 }
 
@@ -86,7 +90,7 @@ impl Drive {
         if !self.nmt.allows(Service::Pdo) {
             return;
         }
-        let id = frame.id().get();
+        let id = frame.id();
         if frame.is_remote() {
             self.on_request(id);
             return;
@@ -95,16 +99,16 @@ impl Drive {
             self.raise(errors::COB_ID_COLLISION, false);
         }
         let found = self.exchange.receive.iter_mut().find(|r| r.pdo.id == id);
-        let Some(received) = found else {
+        let Some(Reception { pdo, state }) = found else {
             return;
         };
-        if frame.data().len() < received.pdo.len {
-            self.raise(errors::PDO_LENGTH, false);
-        } else if received.pdo.transmission == EVERY_SYNC {
-            received.pending = Some(frame.data().to_vec());
-        } else {
-            received.pdo.unpack(frame.data(), &mut self.od);
-            self.after_write();
+        match state.receive(frame.data(), pdo.mapping.bytes(), pdo.transmission) {
+            Received::AtSync => {}
+            Received::Now(data) => {
+                pdo.unpack(data, &mut self.od);
+                self.after_write();
+            }
+            Received::TooShort { .. } => self.raise(errors::PDO_LENGTH, false),
         }
     }
 
@@ -121,28 +125,28 @@ impl Drive {
             .transmit
             .iter()
             .filter(|t| t.pdo.transmission == EVERY_SYNC)
-            .map(|t| WireFrame::standard(t.pdo.id, &t.pdo.pack(&mut self.od)))
+            .map(|t| WireFrame::standard(t.pdo.id.get(), &t.pdo.pack(&mut self.od)))
             .collect();
         for frame in sampled {
             self.plan(at, Job::Transmit(frame));
         }
-        for received in &mut self.exchange.receive {
-            if let Some(data) = received.pending.take() {
-                received.pdo.unpack(&data, &mut self.od);
+        for Reception { pdo, state } in &mut self.exchange.receive {
+            if let Some(data) = state.sync() {
+                pdo.unpack(data, &mut self.od);
             }
         }
         self.after_write();
     }
 
     /// A remote frame asks for a TPDO.
-    fn on_request(&mut self, id: u16) {
+    fn on_request(&mut self, id: CobId) {
         let asked = self
             .exchange
             .transmit
             .iter()
             .find(|t| t.pdo.id == id && t.pdo.on_request);
         if let Some(asked) = asked {
-            let frame = WireFrame::standard(id, &asked.pdo.pack(&mut self.od));
+            let frame = WireFrame::standard(id.get(), &asked.pdo.pack(&mut self.od));
             self.send_tpdo(frame);
         }
     }
@@ -155,14 +159,14 @@ impl Drive {
         let mut frames = Vec::new();
         for transmitted in &mut self.exchange.transmit {
             let pdo = &transmitted.pdo;
-            if pdo.transmission != ON_CHANGE || self.now < transmitted.inhibited_until {
+            if !pdo.transmission.is_event_driven() || self.now < transmitted.inhibited_until {
                 continue;
             }
             let data = pdo.pack(&mut self.od);
             if transmitted.last.as_ref() != Some(&data) {
                 let pause = self.clock.span(u64::from(pdo.inhibit) * INHIBIT_US);
                 transmitted.inhibited_until = self.now + pause;
-                frames.push(WireFrame::standard(pdo.id, &data));
+                frames.push(WireFrame::standard(pdo.id.get(), &data));
                 transmitted.last = Some(data);
             }
         }

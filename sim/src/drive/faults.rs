@@ -1,59 +1,55 @@
 //! Faults of the configuration, turned into what the drive does.
 
-use super::config::{DriveConfig, DriveFault};
+use super::config::DriveFault;
 use super::{Drive, Job, Planned};
+use crate::time::Time;
 use canmaster::id::Address;
 use canmaster::sdo::AbortCode;
 
-/// Faults that are there from the start.
-pub(super) fn configure(config: &mut DriveConfig) {
-    for fault in config.faults.clone() {
-        match fault {
-            DriveFault::Identity(identity) => config.identity = identity,
-            DriveFault::SdoLatency(latency) => config.sdo_latency = latency,
-            _ => {}
+impl Drive {
+    /// Power-on, and the faults of the configuration.
+    pub(super) fn plan_life(&mut self) {
+        self.plan_always(self.config.power_on, Job::PowerOn);
+        for fault in self.config.faults.clone() {
+            self.apply(fault);
         }
     }
-}
 
-/// The entries whose writing is refused.
-pub(super) fn refused(config: &DriveConfig) -> Vec<(Address, AbortCode)> {
-    let refusal = |fault: &DriveFault| match *fault {
-        DriveFault::RefuseWrite { index, sub, abort } => {
-            Some((Address::new(index, sub), AbortCode(abort)))
-        }
-        _ => None,
-    };
-    config.faults.iter().filter_map(refusal).collect()
-}
+    /// One more fault, from now on. Moments that have passed mean now.
+    pub fn inject(&mut self, fault: DriveFault) {
+        self.config.faults.push(fault);
+        self.apply(fault);
+    }
 
-impl Drive {
-    /// Power-on, and what the faults do at their moments.
-    pub(super) fn plan_faults(&mut self) {
-        let mut plan = |at, job| {
-            self.agenda.push(Planned {
-                at,
-                job,
-                life: None,
-            });
-        };
-        plan(self.config.power_on, Job::PowerOn);
-        for fault in &self.config.faults {
-            match *fault {
-                DriveFault::PowerLoss { at } => plan(at, Job::PowerOff),
-                DriveFault::PowerCycle { off, on } => {
-                    plan(off, Job::PowerOff);
-                    plan(on, Job::PowerOn);
-                }
-                DriveFault::Error { at, code, until } => {
-                    let lasting = until.is_some();
-                    plan(at, Job::Error { code, lasting });
-                    if let Some(until) = until {
-                        plan(until, Job::CauseGone(code));
-                    }
-                }
-                _ => {}
+    fn apply(&mut self, fault: DriveFault) {
+        match fault {
+            DriveFault::Identity(identity) => self.od.set_identity(identity),
+            DriveFault::RefuseWrite { index, sub, abort } => {
+                let refusal = (Address::new(index, sub), AbortCode(abort));
+                self.od.refused.push(refusal);
             }
+            DriveFault::SdoLatency(latency) => self.config.sdo_latency = latency,
+            DriveFault::PowerLoss { at } => self.plan_always(at, Job::PowerOff),
+            DriveFault::PowerCycle { off, on } => {
+                self.plan_always(off, Job::PowerOff);
+                self.plan_always(on, Job::PowerOn);
+            }
+            DriveFault::Error { at, code, until } => {
+                let lasting = until.is_some();
+                self.plan_always(at, Job::Error { code, lasting });
+                if let Some(until) = until {
+                    self.plan_always(until, Job::CauseGone(code));
+                }
+            }
+            // Looked at whenever there is something to send.
+            DriveFault::SdoDead { .. }
+            | DriveFault::HeartbeatLost { .. }
+            | DriveFault::TpdosLost { .. } => {}
         }
+    }
+
+    fn plan_always(&mut self, at: Time, job: Job) {
+        let life = None;
+        self.agenda.push(Planned { at, job, life });
     }
 }

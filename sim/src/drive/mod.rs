@@ -113,12 +113,10 @@ pub struct Drive {
 
 impl Drive {
     /// A drive before its power-on.
-    pub fn new(mut config: DriveConfig) -> Drive {
-        faults::configure(&mut config);
+    pub fn new(config: DriveConfig) -> Drive {
         let clock = Clock::new(config.power_on, config.clock_ppm);
         let servo = Servo::new(config.servo, config.plant, config.seed);
-        let mut od = Dictionary::new(config.node, config.identity);
-        od.refused = faults::refused(&config);
+        let od = Dictionary::new(config.node, config.identity);
         let mut random = Random::new(config.seed, random::LATENCY);
         // Control cycles of different drives are not in step.
         let phase = clock.span(random.integer(0, 400));
@@ -144,7 +142,7 @@ impl Drive {
             samples: None,
             config,
         };
-        drive.plan_faults();
+        drive.plan_life();
         drive
     }
 

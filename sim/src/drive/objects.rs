@@ -8,19 +8,12 @@ use canmaster::od::DataType::{
     Domain, Integer8, Integer16, Integer32, Unsigned8, Unsigned16, Unsigned32,
 };
 use canmaster::od::{Mappable, Object, Table};
+use canmaster::pdo::{RPDO_COMMUNICATION, RPDO_MAPPING, TPDO_COMMUNICATION, TPDO_MAPPING};
 
 /// RPDOs and TPDOs of the drive, each.
 pub const PDOS: u16 = 4;
 /// Entries of one mapping.
 pub const MAPPING_ENTRIES: u8 = 12;
-/// RPDO communication parameters.
-pub const RPDO_COMMUNICATION: u16 = 0x1400;
-/// RPDO mapping parameters.
-pub const RPDO_MAPPING: u16 = 0x1600;
-/// TPDO communication parameters.
-pub const TPDO_COMMUNICATION: u16 = 0x1800;
-/// TPDO mapping parameters.
-pub const TPDO_MAPPING: u16 = 0x1A00;
 
 const CONTROLWORD_ENTRY: i64 = 0x6040_0010;
 const STATUSWORD_ENTRY: i64 = 0x6041_0010;

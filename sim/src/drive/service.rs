@@ -3,9 +3,10 @@
 
 use super::config::DriveFault;
 use super::dictionary::Dictionary;
-use super::objects::{PDOS, RPDO_COMMUNICATION, TPDO_MAPPING};
+use super::objects::PDOS;
 use super::{Drive, Job, errors};
 use canmaster::nmt;
+use canmaster::pdo::{RPDO_COMMUNICATION, TPDO_MAPPING};
 use canmaster::sdo::{AbortCode, Server};
 use canmaster::{Duration, Frame, Instant, NodeId};
 use std::collections::VecDeque;

@@ -4,5 +4,6 @@ mod boot;
 mod faults;
 mod motion;
 mod objects;
+mod on_bus;
 mod process;
 mod rig;
