@@ -83,6 +83,9 @@ pub struct DriveConfig {
     pub boot: Spread,
     /// From an SDO request to its answer, 0.2 .. 1.0 ms (field: up to 15 ms).
     pub sdo_latency: Spread,
+    /// Segments per block that its SDO server takes; 0: it answers block
+    /// transfers with 05040001h. Unproven on the real drive.
+    pub sdo_block_size: u8,
     /// From SYNC to the request to send the TPDOs, 50 .. 250 us.
     pub tpdo_delay: Spread,
     /// How long it stays off the bus after bus-off.
@@ -112,6 +115,7 @@ impl DriveConfig {
             power_on: Time::ZERO,
             boot: Spread::new(200_000, 600_000),
             sdo_latency: Spread::new(200, 1000),
+            sdo_block_size: 0,
             tpdo_delay: Spread::new(50, 250),
             bus_off_pause: Spread::fixed(100_000),
             servo: ServoConfig {

@@ -2,7 +2,7 @@
 //! first, and the way through bus-off.
 
 use crate::bus::{ErrorState, EventKind, Offer};
-use crate::frame::WireFrame;
+use crate::frame::{WireFrame, WireId};
 use crate::time::Time;
 
 /// Frames that can wait.
@@ -73,6 +73,11 @@ impl Controller {
         }
     }
 
+    /// How many frames with this identifier wait or are on the wire.
+    pub(super) fn waiting(&self, id: WireId) -> usize {
+        self.queue.iter().filter(|w| w.frame.id == id).count()
+    }
+
     /// Everything that waits is forgotten.
     pub(super) fn clear(&mut self) {
         self.queue.clear();
@@ -133,7 +138,7 @@ mod tests {
 
     fn first(c: &Controller) -> (u16, u8) {
         let offer = c.offer().unwrap();
-        let crate::frame::WireId::Standard(id) = offer.frame.id else {
+        let WireId::Standard(id) = offer.frame.id else {
             panic!("standard frames only");
         };
         (id, offer.frame.data[0])

@@ -68,6 +68,8 @@ enum Job {
     Boot,
     /// An SDO request is ready to be served.
     Serve,
+    /// The answer to a block of segments is ready.
+    Answer(Frame),
     /// A TPDO is ready to be sent.
     Transmit(WireFrame),
     /// The pause after bus-off is over.
@@ -134,7 +136,7 @@ impl Drive {
             controller: Controller::default(),
             od,
             axis: Axis::new(servo),
-            service: SdoService::new(config.node),
+            service: SdoService::new(config.node, config.sdo_block_size),
             exchange: Exchange::default(),
             watch: Watch::new(config.node),
             last_emcy: None,
@@ -170,6 +172,8 @@ impl Drive {
         {
             self.on_frame(&frame);
         }
+        // A frame that has left makes room for the next.
+        self.advance(event.at);
     }
 
     /// What its controller would send next.
@@ -242,6 +246,7 @@ impl Drive {
             Job::PowerOff => self.power_off(),
             Job::Boot => self.boot(),
             Job::Serve => self.serve(),
+            Job::Answer(frame) => self.transmit(frame),
             Job::Transmit(frame) => self.send_tpdo(frame),
             Job::BusOffOver => self.bus_off_over(),
             Job::Error { code, lasting } => self.raise(code, lasting),

@@ -49,7 +49,7 @@ impl Drive {
         let timers = consumers
             .filter_map(|(_, consumer)| consumer.next_deadline())
             .chain(self.watch.producer.next_deadline())
-            .chain(self.service.next_deadline());
+            .chain(self.service.next_deadline().filter(|_| self.answer_fits()));
         timers.min().map(|instant| self.clock.when(instant))
     }
 

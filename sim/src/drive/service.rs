@@ -5,6 +5,8 @@ use super::config::DriveFault;
 use super::dictionary::Dictionary;
 use super::objects::PDOS;
 use super::{Drive, Job, errors};
+use crate::frame::WireId;
+use crate::time::Time;
 use canmaster::nmt;
 use canmaster::pdo::{RPDO_COMMUNICATION, TPDO_MAPPING};
 use canmaster::sdo::{AbortCode, Server};
@@ -17,19 +19,31 @@ const QUEUE: usize = 8;
 const TIMEOUT: Duration = Duration::from_millis(1000);
 /// First byte of an abort.
 const ABORT: u8 = 0x80;
+/// First byte of the answer that opens a block download, whatever its CRC bit.
+const BLOCK_DOWNLOAD: u8 = 0xA0;
+const CRC_SUPPORTED: u8 = 0x04;
+/// First byte of the answer to a block of segments.
+const BLOCK_ANSWER: u8 = 0xA2;
+/// Answers that may wait in the controller: one on the wire, one behind it, so
+/// that the segments of a block upload follow each other without a gap.
+const ANSWERS_WAITING: usize = 2;
 
 /// The service.
 #[derive(Clone, Debug)]
 pub(super) struct SdoService {
     server: Server,
     waiting: VecDeque<Frame>,
+    /// Segments of a block download follow: nobody answers them, so they do
+    /// not wait either.
+    segments: bool,
 }
 
 impl SdoService {
-    pub(super) fn new(node: NodeId) -> SdoService {
+    pub(super) fn new(node: NodeId, block_size: u8) -> SdoService {
         SdoService {
-            server: Server::new(node, TIMEOUT),
+            server: Server::new(node, TIMEOUT).with_block_size(block_size),
             waiting: VecDeque::new(),
+            segments: false,
         }
     }
 
@@ -37,8 +51,11 @@ impl SdoService {
     pub(super) fn reset(&mut self, od: &mut Dictionary) {
         self.server.reset(od);
         self.waiting.clear();
+        self.segments = false;
     }
 
+    /// The server's deadline: a timeout, or the next segment of a block
+    /// upload.
     pub(super) fn next_deadline(&self) -> Option<Instant> {
         self.server.next_deadline()
     }
@@ -51,6 +68,13 @@ impl Drive {
         if !request || !self.nmt.allows(nmt::Service::Sdo) || self.sdo_dead() {
             return;
         }
+        if self.service.segments {
+            if let Some(answer) = self.work(frame) {
+                let at = self.now + self.latency();
+                self.plan(at, Job::Answer(answer));
+            }
+            return;
+        }
         if self.service.waiting.len() >= QUEUE {
             self.raise(errors::RECEIVE_QUEUE, false);
             return;
@@ -61,9 +85,14 @@ impl Drive {
         }
     }
 
+    fn latency(&mut self) -> Time {
+        self.clock
+            .span(self.config.sdo_latency.draw(&mut self.random))
+    }
+
     fn plan_serving(&mut self) {
-        let latency = self.config.sdo_latency.draw(&mut self.random);
-        self.plan(self.now + self.clock.span(latency), Job::Serve);
+        let at = self.now + self.latency();
+        self.plan(at, Job::Serve);
     }
 
     /// The first request has been worked on: the answer goes out.
@@ -72,21 +101,41 @@ impl Drive {
         let Some(frame) = self.service.waiting.pop_front() else {
             return;
         };
-        let now = self.clock.own(self.now);
-        let answer = self.service.server.on_frame(&frame, now, &mut self.od);
-        self.after_write();
-        if let Some(answer) = answer {
-            self.transmit(as_epos4(answer));
+        if let Some(answer) = self.work(&frame) {
+            self.transmit(answer);
         }
         if !self.service.waiting.is_empty() {
             self.plan_serving();
         }
     }
 
+    fn work(&mut self, frame: &Frame) -> Option<Frame> {
+        let now = self.clock.own(self.now);
+        let answer = self.service.server.on_frame(frame, now, &mut self.od);
+        self.after_write();
+        let answer = as_epos4(answer?);
+        let command = answer.padded()[0];
+        self.service.segments =
+            command == BLOCK_ANSWER || command & !CRC_SUPPORTED == BLOCK_DOWNLOAD;
+        Some(answer)
+    }
+
+    /// Whether the controller takes another answer.
+    pub(super) fn answer_fits(&self) -> bool {
+        let id = WireId::Standard(self.od.number(0x1200, 2) as u16);
+        self.controller.waiting(id) < ANSWERS_WAITING
+    }
+
+    /// A timer of the server has run out.
     pub(super) fn poll_server(&mut self) {
         let now = self.clock.own(self.now);
-        while let Some(frame) = self.service.server.poll(now, &mut self.od) {
+        if self.answer_fits()
+            && let Some(frame) = self.service.server.poll(now, &mut self.od)
+        {
             self.transmit(frame);
+        }
+        if self.service.server.is_idle() {
+            self.service.segments = false;
         }
     }
 

@@ -1,7 +1,7 @@
 //! The object dictionary through SDO.
 
 use super::rig::{Rig, abort_code, quick};
-use crate::drive::DriveFault;
+use crate::drive::{DriveConfig, DriveFault};
 
 #[test]
 fn identity_and_defaults() {
@@ -202,4 +202,29 @@ fn velocity_units() {
     assert!((rig.rpm() - 1000.0).abs() < 5.0);
     let seen = rig.read(0x606C, 0).unwrap() as i32;
     assert!((9_900..10_100).contains(&seen), "{seen}");
+}
+
+#[test]
+fn block_transfer_where_the_drive_is_said_to_have_it() {
+    let mut rig = Rig::booted(DriveConfig {
+        sdo_block_size: 127,
+        ..quick(1)
+    });
+    // Download of 6083h, without CRC.
+    let answer = rig.sdo([0xC2, 0x83, 0x60, 0, 4, 0, 0, 0]).unwrap();
+    assert_eq!(answer, [0xA4, 0x83, 0x60, 0, 127, 0, 0, 0]);
+    let answer = rig.sdo([0x81, 0xD2, 0x04, 0, 0, 0, 0, 0]).unwrap();
+    assert_eq!(answer, [0xA2, 1, 127, 0, 0, 0, 0, 0]);
+    let answer = rig.sdo([0xCD, 0, 0, 0, 0, 0, 0, 0]).unwrap();
+    assert_eq!(answer, [0xA1, 0, 0, 0, 0, 0, 0, 0]);
+    assert_eq!(rig.read(0x6083, 0), Ok(1234));
+    // Upload of the name: start, one segment, end.
+    let answer = rig.sdo([0xA0, 0x08, 0x10, 0, 127, 0, 0, 0]).unwrap();
+    assert_eq!(answer[..5], [0xC6, 0x08, 0x10, 0, 5]);
+    let answer = rig.sdo([0xA3, 0, 0, 0, 0, 0, 0, 0]).unwrap();
+    assert_eq!(answer, [0x81, b'E', b'P', b'O', b'S', b'4', 0, 0]);
+    let answer = rig.sdo([0xA2, 1, 127, 0, 0, 0, 0, 0]).unwrap();
+    assert_eq!(answer[0], 0xC9);
+    assert_eq!(rig.sdo([0xA1, 0, 0, 0, 0, 0, 0, 0]), None);
+    assert_eq!(rig.read(0x1018, 1), Ok(0xFB));
 }
