@@ -7,3 +7,4 @@ pub mod frame;
 pub mod judge;
 pub mod log;
 pub mod time;
+pub mod world;

@@ -17,11 +17,23 @@ pub struct Part {
 /// What the firmware's program asks of the axes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Assignment {
-    /// The parts of each move by axis. All moves, one after the other, make a
-    /// round trip.
-    pub moves: Vec<Vec<Part>>,
+    /// The parts of each move by axis; an axis without one rests. All moves,
+    /// one after the other, make a round trip.
+    pub moves: Vec<Vec<Option<Part>>>,
     /// SYNC period: axes of one set have to stop within it.
     pub cycle: Time,
+}
+
+impl Assignment {
+    /// The moves of one axis: their places in the program and its parts.
+    pub fn of_axis(&self, axis: usize) -> impl Iterator<Item = (usize, Part)> + '_ {
+        self.moves
+            .iter()
+            .enumerate()
+            .filter_map(move |(step, parts)| {
+                parts.get(axis).copied().flatten().map(|part| (step, part))
+            })
+    }
 }
 
 /// A release: what the operator gave with the button.
@@ -75,10 +87,10 @@ pub fn arrivals(
                 .movements()
                 .iter()
                 .filter(|movement| movement.release == number);
-            for (step, (movement, parts)) in movements.zip(&assignment.moves).enumerate() {
-                let (Some(part), Some(&home)) = (parts.get(axis), release.homes.get(axis)) else {
-                    continue;
-                };
+            let Some(&home) = release.homes.get(axis) else {
+                continue;
+            };
+            for (movement, (step, part)) in movements.zip(assignment.of_axis(axis)) {
                 let target = home.wrapping_add(part.target);
                 if movement.settled {
                     all.push(Arrival {
@@ -138,7 +150,7 @@ mod tests {
     }
 
     fn assignment() -> Assignment {
-        let both = |target| vec![Part { target, set: 1 }; 2];
+        let both = |target| vec![Some(Part { target, set: 1 }); 2];
         Assignment {
             moves: vec![both(20_000), both(0)],
             cycle: Time::from_ms(10),

@@ -95,7 +95,7 @@ fn failure(evidence: &Evidence<'_>) -> Option<String> {
     // What the firmware says itself names cause and remedy; everything else
     // may be its consequence. The one thing worse is motion out of nowhere.
     unreleased(evidence)
-        .or_else(|| evidence.error_line.map(str::to_string))
+        .or_else(|| evidence.error_line.map(|line| line.replace('\n', " ")))
         .or_else(|| evidence.board_complaint.map(str::to_string))
         .or_else(|| beside_target(evidence))
         .or_else(|| moves_missing(evidence))
@@ -142,12 +142,12 @@ fn beside_target(evidence: &Evidence<'_>) -> Option<String> {
 }
 
 fn moves_missing(evidence: &Evidence<'_>) -> Option<String> {
-    let expected = evidence.assignment.moves.len();
     for (number, release) in (1..).zip(evidence.releases) {
         if release.done.is_none() || release.revoked {
             continue;
         }
-        for (node, axis) in evidence.nodes.iter().zip(evidence.axes) {
+        for (place, (node, axis)) in evidence.nodes.iter().zip(evidence.axes).enumerate() {
+            let expected = evidence.assignment.of_axis(place).count();
             let made = axis
                 .movements()
                 .iter()
@@ -243,7 +243,7 @@ mod tests {
             nodes: &NODES,
             axes: &case.axes,
             assignment: &Assignment {
-                moves: vec![vec![Part { target: 7, set: 1 }; 2]],
+                moves: vec![vec![Some(Part { target: 7, set: 1 }); 2]],
                 cycle: Time::from_ms(10),
             },
             releases: &case.releases,

@@ -1,0 +1,84 @@
+//! What is done to the machine from outside, at given moments.
+
+use std::collections::BTreeMap;
+
+use canmaster::NodeId;
+
+use crate::bus::BusFault;
+use crate::time::Time;
+
+/// One thing done to the machine.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Stimulus {
+    /// The contact of button B1 closes or opens.
+    Button(bool),
+    /// The reset pin is pulled low, or let go.
+    Reset(bool),
+    /// An interrupt of the board is not taken any more, or is again.
+    BlockIrq {
+        /// Its number.
+        irq: u8,
+        /// Whether it is held back.
+        blocked: bool,
+    },
+    /// An interrupt of the board is taken late.
+    DelayIrq {
+        /// Its number.
+        irq: u8,
+        /// At most by so many core cycles, drawn anew each time.
+        max_cycles: u64,
+    },
+    /// A drive sends nothing any more, but still hears and obeys.
+    Silence {
+        /// Which.
+        node: NodeId,
+    },
+    /// The bus gets a fault.
+    Bus(BusFault),
+}
+
+/// What is still to be done, in the order of time and then of asking.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Agenda {
+    queue: BTreeMap<(Time, u64), Stimulus>,
+    asked: u64,
+}
+
+impl Agenda {
+    pub(super) fn add(&mut self, at: Time, stimulus: Stimulus) {
+        self.queue.insert((at, self.asked), stimulus);
+        self.asked += 1;
+    }
+
+    /// When the next one is due.
+    pub(super) fn next(&self) -> Option<Time> {
+        self.queue.keys().next().map(|(at, _)| *at)
+    }
+
+    /// The next one that is due by `now`.
+    pub(super) fn due(&mut self, now: Time) -> Option<Stimulus> {
+        if self.next()? > now {
+            return None;
+        }
+        self.queue.pop_first().map(|(_, stimulus)| stimulus)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_moments_keep_their_order() {
+        let mut agenda = Agenda::default();
+        agenda.add(Time::from_ms(2), Stimulus::Reset(false));
+        agenda.add(Time::from_ms(1), Stimulus::Button(true));
+        agenda.add(Time::from_ms(1), Stimulus::Button(false));
+        assert_eq!(agenda.next(), Some(Time::from_ms(1)));
+        assert_eq!(agenda.due(Time::ZERO), None);
+        assert_eq!(agenda.due(Time::from_ms(1)), Some(Stimulus::Button(true)));
+        assert_eq!(agenda.due(Time::from_ms(1)), Some(Stimulus::Button(false)));
+        assert_eq!(agenda.due(Time::from_ms(1)), None);
+        assert_eq!(agenda.due(Time::MAX), Some(Stimulus::Reset(false)));
+    }
+}

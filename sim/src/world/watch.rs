@@ -1,0 +1,237 @@
+//! Follows the machine: who is enabled, who moves under which release, who
+//! has come home.
+
+use crate::judge::{AxisMonitor, Release, TracePoint};
+use crate::time::Time;
+
+/// Full motion: all axes turn faster than this, rpm.
+const FULL_MOTION_RPM: f64 = 300.0;
+
+/// Whether this counts as full motion.
+pub(super) fn is_full_motion(velocity_rpm: f64) -> bool {
+    velocity_rpm.abs() > FULL_MOTION_RPM
+}
+
+/// What is true of one axis at a moment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct AxisTruth {
+    pub(super) position: f64,
+    pub(super) velocity: f64,
+    pub(super) operational: bool,
+    pub(super) enabled: bool,
+}
+
+/// When the machine got ready.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Startup {
+    /// All drives were in NMT operational for the first time.
+    pub operational: Option<Time>,
+    /// All drives were in operation enabled for the first time.
+    pub enabled: Option<Time>,
+}
+
+/// See the module.
+#[derive(Clone, Debug)]
+pub(super) struct Watch {
+    pub(super) axes: Vec<AxisMonitor>,
+    pub(super) releases: Vec<Release>,
+    pub(super) startup: Startup,
+    /// Moves of one round trip, by axis.
+    moves: Vec<usize>,
+    homes: Vec<i32>,
+    enabled: Vec<bool>,
+    /// Motion is allowed under the newest release.
+    released: bool,
+    round_trip: Option<Time>,
+    full_motion: bool,
+}
+
+impl Watch {
+    pub(super) fn new(moves: Vec<usize>) -> Watch {
+        let axes = moves.len();
+        Watch {
+            axes: vec![AxisMonitor::default(); axes],
+            releases: Vec::new(),
+            startup: Startup::default(),
+            moves,
+            homes: vec![0; axes],
+            enabled: vec![false; axes],
+            released: false,
+            round_trip: None,
+            full_motion: false,
+        }
+    }
+
+    /// Takes in the truth; a drive that is missing has none. True if a round
+    /// trip was finished just now.
+    pub(super) fn sample(&mut self, at: Time, truth: &[Option<AxisTruth>]) -> bool {
+        let release = self.released.then_some(self.releases.len());
+        for (axis, truth) in truth.iter().enumerate() {
+            let Some(truth) = truth else { continue };
+            self.axes[axis].sample(
+                TracePoint {
+                    at,
+                    position: truth.position,
+                    velocity: truth.velocity,
+                },
+                release,
+            );
+            if truth.enabled && !self.enabled[axis] {
+                // The increment in which the encoder stands.
+                self.homes[axis] = truth.position.floor() as i64 as i32;
+            }
+            self.enabled[axis] = truth.enabled;
+        }
+        let all =
+            |test: fn(&AxisTruth) -> bool| truth.iter().all(|axis| axis.as_ref().is_some_and(test));
+        if self.startup.operational.is_none() && all(|axis| axis.operational) {
+            self.startup.operational = Some(at);
+        }
+        if self.startup.enabled.is_none() && all(|axis| axis.enabled) {
+            self.startup.enabled = Some(at);
+        }
+        self.full_motion |= all(|axis| is_full_motion(axis.velocity));
+        self.finish_release(at)
+    }
+
+    /// All drives are enabled and at rest.
+    pub(super) fn ready(&self) -> bool {
+        self.enabled.iter().all(|enabled| *enabled) && self.at_rest() && !self.released
+    }
+
+    /// No axis moves.
+    pub(super) fn at_rest(&self) -> bool {
+        self.axes.iter().all(AxisMonitor::at_rest)
+    }
+
+    /// Every axis has been in full motion at the same time.
+    pub(super) fn full_motion(&self) -> bool {
+        self.full_motion
+    }
+
+    /// The longest round trip so far.
+    pub(super) fn round_trip(&self) -> Option<Time> {
+        self.round_trip
+    }
+
+    /// The operator lets the machine move.
+    pub(super) fn release(&mut self, at: Time) {
+        self.releases.push(Release {
+            at,
+            homes: self.homes.clone(),
+            done: None,
+            revoked: false,
+        });
+        self.released = true;
+    }
+
+    /// The machine has to come to rest: a stop, a reset, a fault.
+    pub(super) fn revoke(&mut self) {
+        if let Some(release) = self.releases.last_mut()
+            && release.done.is_none()
+        {
+            release.revoked = true;
+        }
+    }
+
+    fn finish_release(&mut self, at: Time) -> bool {
+        if !self.released || !self.at_rest() {
+            return false;
+        }
+        let number = self.releases.len();
+        let Some(release) = self.releases.last_mut() else {
+            return false;
+        };
+        if release.revoked {
+            self.released = false;
+            return false;
+        }
+        let made = |axis: &AxisMonitor| {
+            axis.movements()
+                .iter()
+                .filter(|movement| movement.release == number)
+                .count()
+        };
+        if self
+            .axes
+            .iter()
+            .zip(&self.moves)
+            .any(|(axis, &moves)| made(axis) < moves)
+        {
+            return false;
+        }
+        release.done = Some(at);
+        let took = at - release.at;
+        self.round_trip = Some(self.round_trip.map_or(took, |longest| longest.max(took)));
+        self.released = false;
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn truth(position: f64, velocity: f64) -> Vec<Option<AxisTruth>> {
+        vec![Some(AxisTruth {
+            position,
+            velocity,
+            operational: true,
+            enabled: true,
+        })]
+    }
+
+    /// 200 ms of motion and 300 ms of rest; whether a round trip was finished.
+    fn one_move(watch: &mut Watch, start_ms: u64) -> bool {
+        (0..500).fold(false, |done, ms| {
+            let velocity = if ms < 200 { 900.0 } else { 0.0 };
+            done | watch.sample(Time::from_ms(start_ms + ms), &truth(50.9, velocity))
+        })
+    }
+
+    #[test]
+    fn a_round_trip_is_all_moves_and_rest() {
+        let mut watch = Watch::new(vec![2]);
+        watch.sample(Time::from_ms(1), &truth(10.7, 0.0));
+        assert!(watch.ready());
+        assert_eq!(watch.startup.enabled, Some(Time::from_ms(1)));
+        watch.release(Time::from_ms(2));
+        assert!(!watch.ready());
+        assert!(!one_move(&mut watch, 10));
+        assert!(!watch.ready(), "half of it is not all");
+        assert!(one_move(&mut watch, 1000));
+        assert!(watch.ready());
+        assert_eq!(watch.releases[0].homes, [10]);
+        assert_eq!(watch.axes[0].unreleased(), None);
+        assert!(watch.round_trip().is_some() && watch.full_motion());
+        one_move(&mut watch, 3000);
+        assert!(
+            watch.axes[0].unreleased().is_some(),
+            "a third move was not asked for"
+        );
+    }
+
+    #[test]
+    fn a_revoked_release_ends_with_standstill() {
+        let mut watch = Watch::new(vec![2]);
+        watch.sample(Time::from_ms(1), &truth(0.0, 0.0));
+        watch.release(Time::from_ms(2));
+        watch.sample(Time::from_ms(3), &truth(0.0, 500.0));
+        watch.revoke();
+        one_move(&mut watch, 4);
+        assert_eq!(watch.axes[0].unreleased(), None, "it may slow down");
+        assert!(watch.releases[0].revoked && watch.releases[0].done.is_none());
+        one_move(&mut watch, 1000);
+        assert!(watch.axes[0].unreleased().is_some());
+    }
+
+    #[test]
+    fn a_missing_drive_keeps_the_machine_from_being_ready() {
+        let mut watch = Watch::new(vec![2, 2]);
+        let mut all = truth(0.0, 0.0);
+        all.push(None);
+        watch.sample(Time::from_ms(1), &all);
+        assert!(!watch.ready());
+        assert_eq!(watch.startup, Startup::default());
+    }
+}
