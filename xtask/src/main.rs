@@ -1,2 +1,42 @@
-//! Commands.
-fn main() {}
+//! The project's commands. `cargo xtask help` lists them.
+
+mod attach;
+mod campaign;
+mod cargo;
+mod ci;
+mod cli;
+mod firmware;
+mod image;
+mod report;
+mod run;
+mod size;
+mod table;
+mod toolchain;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use cli::{Cli, Command};
+
+fn main() -> ExitCode {
+    // Unknown options and bad numbers end in here, with usage and exit code 2.
+    let cli = Cli::parse();
+    let outcome = match cli.command {
+        Command::Run(options) => run::command(&options),
+        Command::Test(options) => ci::test(&options),
+        Command::Build => firmware::command(),
+        Command::Size(options) => size::command(&options),
+        Command::Flash => attach::flash(),
+        Command::Attach => attach::attach(),
+        Command::Ci(options) => ci::command(&options),
+        Command::Campaign(options) => campaign::command(&options),
+    };
+    match outcome {
+        Ok(code) => code,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! `cargo xtask campaign`: the long figures, of which `test` takes samples.
+
+mod job;
+mod pool;
+
+use std::process::ExitCode;
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use canmaster_sim::time::Time;
+use canmaster_sim::world::Image;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+
+use crate::cli::CampaignOptions;
+use crate::{firmware, table};
+use job::{Job, Row};
+
+/// The JSON object.
+#[derive(Serialize)]
+struct Report {
+    result: &'static str,
+    seeds: u64,
+    seconds: f64,
+    wall_s: f64,
+    runs: Vec<Row>,
+}
+
+pub(crate) fn command(options: &CampaignOptions) -> Result<ExitCode> {
+    eprintln!("Building the firmware.");
+    let image = Image::read(&firmware::build()?).context("the firmware image cannot be run")?;
+    let end = Time::from_secs_f64(options.seconds);
+    let jobs: Vec<Job> = (1..=options.seeds)
+        .flat_map(|seed| Job::all(seed, end))
+        .collect();
+    let workers = options.jobs.map_or_else(pool::cores, |jobs| jobs as usize);
+    let started = Instant::now();
+    let bar = progress(jobs.len());
+    let runs = pool::run(
+        &jobs,
+        workers,
+        |job| job.run(&image),
+        |row: &Row| {
+            bar.inc(1);
+            if !row.ok {
+                bar.suspend(|| eprintln!("seed {}, {}: {}", row.seed, row.kind, row.reason));
+            }
+        },
+    );
+    bar.finish_and_clear();
+    let wall_s = started.elapsed().as_secs_f64();
+    let ok = runs.iter().filter(|row| row.ok).count();
+    let all_ok = ok == runs.len();
+    if options.json {
+        let result = if all_ok { "ok" } else { "failed" };
+        let (seeds, seconds) = (options.seeds, options.seconds);
+        println!(
+            "{}",
+            serde_json::to_string(&Report {
+                result,
+                seeds,
+                seconds,
+                wall_s,
+                runs
+            })?
+        );
+    } else {
+        println!("{}", as_table(&runs));
+        println!("{ok} of {} runs ok, in {wall_s:.0} s", runs.len());
+    }
+    Ok(if all_ok {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    })
+}
+
+fn progress(jobs: usize) -> ProgressBar {
+    let bar = ProgressBar::new(jobs as u64);
+    let style =
+        ProgressStyle::with_template("{bar:24} {pos} of {len} runs, {elapsed}, {eta} to go")
+            .unwrap_or_else(|_| ProgressStyle::default_bar());
+    bar.with_style(style)
+}
+
+fn as_table(runs: &[Row]) -> comfy_table::Table {
+    let mut table = table::new(&Row::HEADING);
+    table::align_right(&mut table, &[0, 3, 4, 5, 6, 7, 8, 9]);
+    for row in runs {
+        table.add_row(row.cells());
+    }
+    table
+}

@@ -1,0 +1,129 @@
+//! `cargo xtask test` and `cargo xtask ci`.
+
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail};
+
+use crate::cli::{CiOptions, LogLevel, RunOptions, TestOptions};
+use crate::image::{Budget, ImageSize};
+use crate::{cargo, firmware, run, size, toolchain};
+
+/// A name and what is done.
+type Step = (&'static str, fn() -> Result<()>);
+
+/// Name of the step that runs them.
+const TESTS: &str = "tests";
+
+/// `cargo xtask test`: the image, then every test of the workspace.
+pub(crate) fn test(options: &TestOptions) -> Result<ExitCode> {
+    tests(&options.args)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn tests(args: &[String]) -> Result<()> {
+    let image = firmware::build()?;
+    // The library's `defmt` feature is off: with it, and DEFMT_LOG set, tests
+    // do not link on the host. `ci` checks it by clippy instead.
+    cargo::run(
+        cargo::cargo()
+            .args(["test", "--workspace", "--profile", "host", "--locked"])
+            .args(args)
+            .env(firmware::IMAGE_VARIABLE, image),
+    )
+}
+
+/// `cargo xtask ci`: everything that has to pass, in the order of how soon it
+/// fails.
+pub(crate) fn command(options: &CiOptions) -> Result<ExitCode> {
+    let steps: [Step; 7] = [
+        ("format", format),
+        ("lints, host", lints_host),
+        ("lints, board", lints_target),
+        (TESTS, || tests(&[])),
+        ("sizes", sizes),
+        ("one run", one_run),
+        ("documentation", documentation),
+    ];
+    let mut passed: Vec<(&str, Duration)> = Vec::new();
+    for (name, step) in steps {
+        if options.no_tests && name == TESTS {
+            continue;
+        }
+        eprintln!("\n== {name}");
+        let started = Instant::now();
+        step().with_context(|| format!("step `{name}`"))?;
+        passed.push((name, started.elapsed()));
+    }
+    println!();
+    for (name, took) in &passed {
+        println!("passed  {name:<16} {:7.1} s", took.as_secs_f64());
+    }
+    let total: Duration = passed.iter().map(|(_, took)| *took).sum();
+    println!(
+        "passed  all {} steps   {:7.1} s",
+        passed.len(),
+        total.as_secs_f64()
+    );
+    Ok(ExitCode::SUCCESS)
+}
+
+fn format() -> Result<()> {
+    cargo::run(cargo::cargo().args(["fmt", "--all", "--check"]))
+}
+
+fn lints_host() -> Result<()> {
+    cargo::run(
+        cargo::cargo()
+            .args(["clippy", "--workspace", "--all-targets", "--all-features"])
+            .args(["--profile", "host", "--locked", "--", "-D", "warnings"]),
+    )
+}
+
+fn lints_target() -> Result<()> {
+    toolchain::ensure_target()?;
+    cargo::run(firmware::cargo_for_target("clippy").args(["--", "-D", "warnings"]))
+}
+
+fn sizes() -> Result<()> {
+    let image = ImageSize::read(&firmware::build()?)?;
+    let budget = Budget::read()?;
+    eprintln!("{}", size::as_table(&image, budget));
+    let exceeded = budget.exceeded_by(&image);
+    if !exceeded.is_empty() {
+        bail!("{} ({})", exceeded.join("; "), Budget::FILE);
+    }
+    Ok(())
+}
+
+fn one_run() -> Result<()> {
+    let options = RunOptions {
+        seconds: None,
+        seed: 1,
+        without: Vec::new(),
+        fault: Vec::new(),
+        realtime: false,
+        log: LogLevel::Info,
+        picture: None,
+        json: false,
+    };
+    if run::command(&options)? != ExitCode::SUCCESS {
+        bail!("not every move of every drive arrived");
+    }
+    Ok(())
+}
+
+fn documentation() -> Result<()> {
+    cargo::run(
+        cargo::cargo()
+            .args([
+                "doc",
+                "--workspace",
+                "--no-deps",
+                "--profile",
+                "host",
+                "--locked",
+            ])
+            .env("RUSTDOCFLAGS", "-D warnings"),
+    )
+}

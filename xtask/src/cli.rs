@@ -1,0 +1,207 @@
+//! What can be typed.
+
+use std::path::PathBuf;
+
+use canmaster::NodeId;
+use canmaster_sim::log::Level;
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use crate::run::fault::Fault;
+
+/// The longest run that can be asked for: an hour of virtual time.
+const LONGEST_RUN_S: f64 = 3600.0;
+
+#[derive(Parser)]
+#[command(
+    name = "cargo xtask",
+    bin_name = "cargo xtask",
+    about = "Build, run, test and flash canmaster",
+    disable_version_flag = true
+)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Subcommand)]
+pub(crate) enum Command {
+    /// Build the firmware, boot it on the emulated board, move six motors
+    Run(RunOptions),
+    /// Build the firmware and run all tests
+    Test(TestOptions),
+    /// Build the firmware image
+    Build,
+    /// Flash and RAM of the image, section by section, against the budget
+    Size(SizeOptions),
+    /// Write the image to a board with probe-rs and show its log
+    Flash,
+    /// Show the log of a board that is running already
+    Attach,
+    /// Everything that has to pass: format, lints, tests, sizes, a run, docs
+    Ci(CiOptions),
+    /// The long figures: many seeds of 60 simulated seconds each
+    Campaign(CampaignOptions),
+}
+
+#[derive(Args, Clone, Debug)]
+pub(crate) struct RunOptions {
+    /// Simulated seconds from power-on; the program repeats whole round trips
+    /// that fit [default: enough for one]
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    pub(crate) seconds: Option<f64>,
+    /// Seed of everything that is drawn at random
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Leave this drive off the bus; may be repeated
+    #[arg(long, value_name = "NODE", value_parser = node)]
+    pub(crate) without: Vec<NodeId>,
+    /// Give a drive a fault: NODE:identity, NODE:refuse=INDEX[:SUB] (hex),
+    /// NODE:silent (in motion); may be repeated
+    #[arg(long, value_name = "FAULT")]
+    pub(crate) fault: Vec<Fault>,
+    /// Never run ahead of the clock on the wall
+    #[arg(long)]
+    pub(crate) realtime: bool,
+    /// Least severe log lines of the firmware that are shown
+    #[arg(long, value_name = "LEVEL", default_value = "info")]
+    pub(crate) log: LogLevel,
+    /// Also write position and velocity of all axes as an SVG picture
+    #[arg(long, value_name = "FILE")]
+    pub(crate) picture: Option<PathBuf>,
+    /// One JSON object on standard output and nothing else there
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Args, Clone, Debug)]
+pub(crate) struct TestOptions {
+    /// Passed on to `cargo test`, for example the name of a test
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+    pub(crate) args: Vec<String>,
+}
+
+#[derive(Args, Clone, Debug)]
+pub(crate) struct CiOptions {
+    /// Leave the tests out: they have run already
+    #[arg(long)]
+    pub(crate) no_tests: bool,
+}
+
+#[derive(Args, Clone, Debug)]
+pub(crate) struct SizeOptions {
+    /// One JSON object on standard output and nothing else there
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Args, Clone, Debug)]
+pub(crate) struct CampaignOptions {
+    /// How many seeds, from 1 on
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    pub(crate) seeds: u64,
+    /// Simulated seconds of each
+    #[arg(long, value_name = "S", default_value = "60", value_parser = seconds)]
+    pub(crate) seconds: f64,
+    /// Runs at the same time [default: one per core]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1024))]
+    pub(crate) jobs: Option<u64>,
+    /// One JSON object on standard output and nothing else there
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Severities as they are typed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum LogLevel {
+    /// Nothing at all
+    Off,
+    Error,
+    Warn,
+    Info,
+    Debug,
+    Trace,
+}
+
+impl LogLevel {
+    /// Whether a line of `level` is to be shown. Lines without a level
+    /// (`defmt::println!`) are shown unless the log is off.
+    pub(crate) fn shows(self, level: Option<Level>) -> bool {
+        let least = match self {
+            LogLevel::Off => return false,
+            LogLevel::Error => Level::Error,
+            LogLevel::Warn => Level::Warn,
+            LogLevel::Info => Level::Info,
+            LogLevel::Debug => Level::Debug,
+            LogLevel::Trace => Level::Trace,
+        };
+        level.is_none_or(|level| level >= least)
+    }
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| "not a number".to_string())?;
+    // Written so that NaN fails as well.
+    if value > 0.0 && value <= LONGEST_RUN_S {
+        Ok(value)
+    } else {
+        Err(format!("must be above 0 and at most {LONGEST_RUN_S}"))
+    }
+}
+
+/// A node of the network that the firmware is built for.
+pub(crate) fn node(text: &str) -> Result<NodeId, String> {
+    let network = canmaster_sim::world::network();
+    let known = || {
+        let ids: Vec<String> = network
+            .nodes
+            .iter()
+            .map(|n| n.id.get().to_string())
+            .collect();
+        format!("the network has the nodes {}", ids.join(", "))
+    };
+    let id: u8 = text
+        .parse()
+        .map_err(|_| format!("not a node-ID; {}", known()))?;
+    network
+        .nodes
+        .iter()
+        .map(|node| node.id)
+        .find(|node| node.get() == id)
+        .ok_or_else(known)
+}
+
+/// Where the results of a run go, relative to the workspace.
+pub(crate) fn results_dir() -> PathBuf {
+    crate::cargo::workspace().join("target").join("run")
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn numbers_are_checked() {
+        for bad in ["0", "-1", "nan", "inf", "3601", "ten", ""] {
+            assert!(seconds(bad).is_err(), "{bad}");
+        }
+        assert_eq!(seconds("0.5"), Ok(0.5));
+        for bad in ["0", "7", "128", "x", "-3"] {
+            assert!(node(bad).is_err(), "{bad}");
+        }
+        assert_eq!(node("3"), Ok(NodeId::constant::<3>()));
+    }
+
+    #[test]
+    fn levels_filter() {
+        assert!(LogLevel::Info.shows(Some(Level::Error)));
+        assert!(!LogLevel::Info.shows(Some(Level::Debug)));
+        assert!(!LogLevel::Off.shows(None));
+    }
+}

@@ -1,0 +1,107 @@
+//! Building the image that is flashed, and that the emulated board boots.
+
+use std::path::PathBuf;
+use std::process::{Command, ExitCode, Stdio};
+
+use anyhow::{Context, Result, bail};
+use serde::Deserialize;
+
+use crate::{cargo, toolchain};
+
+/// Name of the binary.
+const BINARY: &str = "canmaster";
+/// Where tests find an image that is built already.
+pub(crate) const IMAGE_VARIABLE: &str = "CANMASTER_ELF";
+
+/// The image holds every log line; the host filters.
+const DEFMT_LOG: &str = "trace";
+/// Room for the burst of lines while six drives are configured at once.
+const DEFMT_RTT_BUFFER_SIZE: &str = "2048";
+
+/// `cargo xtask build`.
+pub(crate) fn command() -> Result<ExitCode> {
+    let elf = build()?;
+    println!("{}", elf.display());
+    Ok(ExitCode::SUCCESS)
+}
+
+/// A cargo command for the board, with everything from outside that would make
+/// another image kept away from it.
+pub(crate) fn cargo_for_target(subcommand: &str) -> Command {
+    let mut command = cargo::cargo();
+    command
+        .arg(subcommand)
+        .args(["--locked", "--release", "--target", toolchain::TARGET])
+        .args(["--bin", BINARY, "--features", "defmt"])
+        .env("DEFMT_LOG", DEFMT_LOG)
+        .env("DEFMT_RTT_BUFFER_SIZE", DEFMT_RTT_BUFFER_SIZE)
+        .env_remove("RUSTFLAGS")
+        .env_remove("CARGO_ENCODED_RUSTFLAGS")
+        .env_remove("CARGO_BUILD_TARGET");
+    command
+}
+
+/// Builds the image and says where it is.
+pub(crate) fn build() -> Result<PathBuf> {
+    if let Some(image) = std::env::var_os(IMAGE_VARIABLE) {
+        return Ok(PathBuf::from(image));
+    }
+    toolchain::ensure_target()?;
+    let mut command = cargo_for_target("build");
+    let output = command
+        .arg("--message-format=json-render-diagnostics")
+        .stdin(Stdio::null())
+        .stderr(Stdio::inherit())
+        .output()
+        .with_context(|| format!("cannot start `{}`", cargo::line(&command)))?;
+    if !output.status.success() {
+        bail!(
+            "the firmware does not build: `{}` ended with {}",
+            cargo::line(&command),
+            output.status
+        );
+    }
+    executable(&output.stdout).context("cargo built no executable of that name")
+}
+
+/// One of cargo's messages; the others lack the fields.
+#[derive(Deserialize)]
+struct Message {
+    target: Option<Target>,
+    executable: Option<PathBuf>,
+}
+
+#[derive(Deserialize)]
+struct Target {
+    name: String,
+}
+
+/// Finds the image in cargo's messages.
+fn executable(messages: &[u8]) -> Option<PathBuf> {
+    messages
+        .split(|&byte| byte == b'\n')
+        .filter_map(|line| serde_json::from_slice::<Message>(line).ok())
+        .filter(|message| {
+            message
+                .target
+                .as_ref()
+                .is_some_and(|target| target.name == BINARY)
+        })
+        .find_map(|message| message.executable)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_image_is_found_among_the_messages() {
+        let messages = br#"
+{"reason":"compiler-artifact","target":{"name":"canmaster","kind":["lib"]},"executable":null}
+{"reason":"compiler-artifact","target":{"name":"canmaster","kind":["bin"]},"executable":"/t/canmaster"}
+{"reason":"build-finished","success":true}
+"#;
+        assert_eq!(executable(messages), Some(PathBuf::from("/t/canmaster")));
+        assert_eq!(executable(b""), None);
+    }
+}

@@ -1,0 +1,73 @@
+//! Faults that can be asked for on the command line.
+
+use std::str::FromStr;
+
+use canmaster::NodeId;
+use canmaster_sim::world::{Ailment, Scenario};
+
+/// `NODE:identity`, `NODE:refuse=INDEX[:SUB]`, `NODE:silent`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Fault {
+    node: NodeId,
+    ailment: Ailment,
+}
+
+impl Fault {
+    /// The scenario with this fault.
+    pub(crate) fn apply(self, scenario: Scenario) -> Scenario {
+        scenario.ailing(self.node, self.ailment)
+    }
+}
+
+const HELP: &str = "expected NODE:identity, NODE:refuse=INDEX[:SUB] in hex, or NODE:silent";
+
+impl FromStr for Fault {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Fault, String> {
+        let (node, what) = text.split_once(':').ok_or(HELP)?;
+        let node = crate::cli::node(node)?;
+        let ailment = match what.split_once('=') {
+            None if what == "identity" => Ailment::WrongIdentity,
+            None if what == "silent" => Ailment::SilentInMotion,
+            Some(("refuse", object)) => {
+                let (index, sub) = object.split_once(':').unwrap_or((object, "0"));
+                Ailment::RefusesWrite {
+                    index: u16::from_str_radix(index, 16).map_err(|_| HELP)?,
+                    sub: u8::from_str_radix(sub, 16).map_err(|_| HELP)?,
+                }
+            }
+            _ => return Err(HELP.into()),
+        };
+        Ok(Fault { node, ailment })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn faults_are_read() {
+        let node = NodeId::constant::<3>();
+        let read = |text: &str| text.parse::<Fault>();
+        let fault = |ailment| Ok(Fault { node, ailment });
+        assert_eq!(read("3:identity"), fault(Ailment::WrongIdentity));
+        assert_eq!(read("3:silent"), fault(Ailment::SilentInMotion));
+        let refuses = |index, sub| fault(Ailment::RefusesWrite { index, sub });
+        assert_eq!(read("3:refuse=6083"), refuses(0x6083, 0));
+        assert_eq!(read("3:refuse=1016:1"), refuses(0x1016, 1));
+        for bad in [
+            "",
+            "3",
+            "9:silent",
+            "3:loud",
+            "3:refuse",
+            "3:refuse=xyz",
+            "3:refuse=10000",
+            "identity",
+        ] {
+            assert!(read(bad).is_err(), "{bad}");
+        }
+    }
+}

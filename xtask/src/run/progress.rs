@@ -1,0 +1,192 @@
+//! What is shown while a run is going on: which step, which node, how far; and
+//! the firmware's log. All of it on standard error.
+
+use std::io::IsTerminal;
+use std::time::{Duration, Instant};
+
+use canmaster::network;
+use canmaster_sim::bus::RecordKind;
+use canmaster_sim::drive::DriveStatus;
+use canmaster_sim::frame::WireId;
+use canmaster_sim::log::LogLine;
+use canmaster_sim::time::Time;
+use canmaster_sim::world::{self, Observer, World};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use crate::cli::{LogLevel, RunOptions};
+
+/// SDO answers, server to client (CiA 301, 7.3.5).
+const SDO_ANSWER: u16 = 0x580;
+/// How often the step is worked out anew, in virtual time.
+const REFRESH: Time = Time::from_ms(20);
+/// How often the bar is drawn, in times a second.
+const DRAW_HZ: u8 = 15;
+
+/// Shows a run on standard error.
+pub(super) struct Progress {
+    bar: ProgressBar,
+    /// Without a terminal each new step is a line of its own.
+    plain: bool,
+    log: LogLevel,
+    pace: Option<Instant>,
+    next: Time,
+    step: &'static str,
+    answers: Vec<usize>,
+    records_seen: usize,
+}
+
+impl Progress {
+    pub(super) fn new(options: &RunOptions, end: Time) -> Progress {
+        let target = ProgressDrawTarget::stderr_with_hz(DRAW_HZ);
+        let bar = ProgressBar::with_draw_target(Some(end.as_ms()), target);
+        let style = ProgressStyle::with_template("{bar:24} {prefix} {wide_msg}")
+            .unwrap_or_else(|_| ProgressStyle::default_bar());
+        bar.set_style(style);
+        Progress {
+            bar,
+            plain: !std::io::stderr().is_terminal(),
+            log: options.log,
+            pace: options.realtime.then(Instant::now),
+            next: Time::ZERO,
+            step: "",
+            answers: vec![0; world::network().nodes.len()],
+            records_seen: 0,
+        }
+    }
+
+    pub(super) fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+
+    fn say(&self, line: &str) {
+        if self.plain {
+            eprintln!("{line}");
+        } else {
+            self.bar.println(line);
+        }
+    }
+
+    fn show(&mut self, world: &World<'_>) {
+        let (step, detail) = self.describe(world);
+        let (now, end) = (world.now().as_secs_f64(), world.end().as_secs_f64());
+        self.bar.set_position(world.now().as_ms());
+        self.bar.set_prefix(format!("{now:.1} of {end:.1} s"));
+        self.bar.set_message(format!("{step}: {detail}"));
+        if step != self.step {
+            self.step = step;
+            if self.plain {
+                eprintln!("[{now:6.2} of {end:.1} s] {step}");
+            }
+        }
+    }
+
+    /// The step that the machine is in, and how far it has come.
+    fn describe(&mut self, world: &World<'_>) -> (&'static str, String) {
+        let (done, going_on) = world.round_trips();
+        if going_on {
+            return (
+                "moving",
+                format!("round trip {}, positions {}", done + 1, positions(world)),
+            );
+        }
+        if let Some(nodes) = still_to_come(world, world::booted) {
+            return ("waiting for the drives to boot", nodes);
+        }
+        if let Some(nodes) = still_to_come(world, world::operational) {
+            return (
+                "configuring the drives",
+                format!("{}; {nodes}", self.configured(world)),
+            );
+        }
+        if let Some(nodes) = still_to_come(world, world::enabled) {
+            return ("enabling the drives", nodes);
+        }
+        ("standby", format!("{done} round trips made"))
+    }
+
+    /// How much of its configuration each node has answered, counted on the
+    /// wire.
+    fn configured(&mut self, world: &World<'_>) -> String {
+        let network = world::network();
+        let wire = world.wire();
+        for record in wire.get(self.records_seen..).unwrap_or_default() {
+            let RecordKind::Frame(frame) = &record.kind else {
+                continue;
+            };
+            let WireId::Standard(id) = frame.id else {
+                continue;
+            };
+            let answers = |node: &network::Node| id == SDO_ANSWER + u16::from(node.id.get());
+            let axis = network.nodes.iter().position(answers);
+            if let Some(count) = axis.and_then(|axis| self.answers.get_mut(axis)) {
+                *count += 1;
+            }
+        }
+        self.records_seen = wire.len();
+        let answers: usize = self.answers.iter().sum();
+        let all: usize = network
+            .nodes
+            .iter()
+            .map(|node| network::plan(network, node).count() + reads(node))
+            .sum();
+        format!("{} of {all} SDO transfers", answers.min(all))
+    }
+}
+
+/// Identity entries that are read of a node before anything is written.
+fn reads(node: &network::Node) -> usize {
+    let identity = &node.identity;
+    [
+        identity.device_type,
+        identity.vendor,
+        identity.product,
+        identity.revision,
+        identity.serial,
+    ]
+    .iter()
+    .flatten()
+    .count()
+}
+
+/// The nodes that are not yet there.
+fn still_to_come(world: &World<'_>, there: impl Fn(&DriveStatus) -> bool) -> Option<String> {
+    let nodes: Vec<String> = world::network()
+        .nodes
+        .iter()
+        .zip(world.statuses())
+        .filter(|(_, status)| !status.as_ref().is_some_and(&there))
+        .map(|(node, _)| node.id.get().to_string())
+        .collect();
+    (!nodes.is_empty()).then(|| format!("still to come: node {}", nodes.join(", ")))
+}
+
+fn positions(world: &World<'_>) -> String {
+    let positions: Vec<String> = world
+        .truths()
+        .flatten()
+        .map(|truth| format!("{:.0}", truth.position_inc))
+        .collect();
+    positions.join(" ")
+}
+
+impl Observer for Progress {
+    fn log(&mut self, _: Time, line: &LogLine) {
+        if self.log.shows(line.level) {
+            self.say(&line.to_string());
+        }
+    }
+
+    fn look(&mut self, world: &World<'_>) {
+        if world.now() >= self.next {
+            self.next = world.now() + REFRESH;
+            self.show(world);
+        }
+        if let Some(started) = self.pace {
+            let due = Duration::from_micros(world.now().as_us());
+            let early = due.saturating_sub(started.elapsed());
+            if !early.is_zero() {
+                std::thread::sleep(early);
+            }
+        }
+    }
+}
