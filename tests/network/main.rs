@@ -1,8 +1,7 @@
-//! Tests of NMT, EMCY, SYNC, the LSS, the indicators and PDOs.
+//! Tests of NMT, EMCY, SYNC, the indicators and PDOs.
 
 mod emcy;
 mod led;
-mod lss;
 mod nmt;
 mod pdo;
 mod sync;
