@@ -29,6 +29,7 @@ pub mod emcy;
 pub mod frame;
 pub mod id;
 pub mod led;
+pub mod lss;
 pub mod master;
 pub mod motion;
 pub mod network;

@@ -1,7 +1,8 @@
-//! Tests of NMT, EMCY, SYNC, the indicators and PDOs.
+//! Tests of NMT, EMCY, SYNC, the LSS, the indicators and PDOs.
 
 mod emcy;
 mod led;
+mod lss;
 mod nmt;
 mod pdo;
 mod sync;

@@ -1,0 +1,16 @@
+//! Layer setting services: giving nodes their node-ID and bit rate over the
+//! network (CiA 305).
+
+mod address;
+mod bit_rate;
+mod command;
+mod fastscan;
+mod master;
+mod slave;
+
+pub use address::{LssAddress, Part};
+pub use bit_rate::BitRate;
+pub use command::{Answer, ConfigurationResult, Mode, Request};
+pub use fastscan::ScanPart;
+pub use master::{LssError, LssMaster, Outcome, Progress, Service};
+pub use slave::{Device, LssSlave, SlaveEvent};
