@@ -53,6 +53,12 @@ impl Tuning {
     };
 }
 
+/// What an axis rolls on after an advanced ramp, over deceleration times lag
+/// squared. It is a half for a continuous ramp; with ramps in steps of a cycle,
+/// interpolated by the drive (which shortens the lag as learned), simulated
+/// drives of 3 .. 10 ms end nearest to their targets with this value.
+const STOPPING_SHORT: f32 = 1.0;
+
 /// The reference around one SYNC, as the position loop needs it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Window {
@@ -109,7 +115,7 @@ impl PositionControl {
     /// `position` is 6064h as sampled at `window.now`; without it (its TPDO is
     /// missing) the axis is driven by feed-forward alone.
     pub fn step(&mut self, window: &Window, position: Option<i32>, limit: u32) -> i32 {
-        let error = position.map(|p| window.now.minus(p));
+        let error = position.map(|p| window.now.minus(p) + self.stopping_short(&window.now));
         let mut correction = 0.0;
         if let Some(error) = error {
             if window.rests() && error.abs() <= self.tuning.dead_band as f32 {
@@ -130,6 +136,18 @@ impl PositionControl {
         let command = round(within(wanted, -limit, limit));
         self.carry = within(wanted - command as f32, -1.0, 1.0);
         command
+    }
+
+    /// The way in increments by which an axis has to stay behind while it brakes.
+    ///
+    /// The advanced command reaches 0 a lag before the reference does and cannot
+    /// undershoot, so that the axis would roll on when the ramp is over.
+    fn stopping_short(&self, now: &Setpoint) -> f32 {
+        if now.acceleration * now.velocity < 0.0 {
+            STOPPING_SHORT * now.acceleration * self.lag * self.lag
+        } else {
+            0.0
+        }
     }
 
     /// A constant error while the reference accelerates is a wrong lag.
