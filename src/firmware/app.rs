@@ -44,7 +44,10 @@ mod app {
         nmt,
         time::Instant,
     };
-    use heapless::spsc::{Consumer, Producer, Queue};
+    use heapless::{
+        Vec,
+        spsc::{Consumer, Producer, Queue},
+    };
     use nucleo_g474re::{
         Config, can, pac::Interrupt, pins, reset_cause::ResetCause, timers, watchdog::Watchdog,
     };
@@ -279,8 +282,9 @@ mod app {
 
         loop {
             let pending = cx.shared.can_tx.lock(|can_tx| can_tx.pending());
-            let pending = pending.into_iter().flatten().map(CobId::from);
-            let Some(frame) = cx.shared.tx_queue.lock(|queue| queue.next(pending)) else {
+            let pending: Vec<CobId, { can::BUFFERS }> =
+                pending.identifiers().map(CobId::from).collect();
+            let Some(frame) = cx.shared.tx_queue.lock(|queue| queue.next(&pending)) else {
                 break;
             };
             // The frame is made ready before the SYNC is held off.

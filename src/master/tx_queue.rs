@@ -86,15 +86,15 @@ impl<const N: usize> TxQueue<N> {
     /// `None` if two frames other than SYNC are there already, or if nothing
     /// waits but identifiers that are: the controller does not keep the order of
     /// equal identifiers, so it gets the next only when the last has left.
-    pub fn next(&mut self, pending: impl Iterator<Item = CobId> + Clone) -> Option<Frame> {
-        let others = pending.clone().filter(|id| *id != CobId::SYNC).count();
+    pub fn next(&mut self, pending: &[CobId]) -> Option<Frame> {
+        let others = pending.iter().filter(|id| **id != CobId::SYNC).count();
         if others >= SHARED_BUFFERS {
             return None;
         }
         let position = self
             .frames
             .iter()
-            .rposition(|queued| !pending.clone().any(|id| id == queued.id()))?;
+            .rposition(|queued| !pending.contains(&queued.id()))?;
         Some(self.frames.remove(position))
     }
 
@@ -130,8 +130,8 @@ mod tests {
     }
 
     fn next<const N: usize>(queue: &mut TxQueue<N>, pending: &[u16]) -> Option<(u16, u8)> {
-        let pending = pending.iter().map(|id| CobId::new(*id).unwrap());
-        let frame = queue.next(pending)?;
+        let pending: StdVec<_> = pending.iter().map(|id| CobId::new(*id).unwrap()).collect();
+        let frame = queue.next(&pending)?;
         Some((frame.id().get(), frame.data()[0]))
     }
 

@@ -21,6 +21,9 @@ use stm32g4xx_hal::{
 /// How many range filters the controller has for standard identifiers.
 pub const FILTERS: usize = 28;
 
+/// How many frames wait in the controller at most.
+pub const BUFFERS: usize = DEPTH;
+
 /// The two receive FIFOs, three frames deep each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fifo {
@@ -115,17 +118,13 @@ impl Tx {
         found
     }
 
-    /// The identifiers of the frames that wait to be sent.
-    #[inline]
-    pub fn pending(&self) -> [Option<StandardId>; DEPTH] {
-        let waiting = self.waiting();
-        let mut pending = [None; DEPTH];
-        for (index, (slot, held)) in pending.iter_mut().zip(&self.identifiers).enumerate() {
-            if waiting & (1 << index) != 0 {
-                *slot = StandardId::new(*held);
-            }
+    /// What waits to be sent.
+    #[inline(always)]
+    pub fn pending(&self) -> Pending {
+        Pending {
+            waiting: self.waiting(),
+            identifiers: self.identifiers,
         }
-        pending
     }
 
     /// Takes back every frame that has not started, so that none goes out late:
@@ -135,6 +134,25 @@ impl Tx {
         registers()
             .txbcr()
             .write(|w| unsafe { w.bits((1 << DEPTH) - 1) });
+    }
+}
+
+/// The frames that waited to be sent at one moment.
+#[derive(Clone, Copy, Debug)]
+pub struct Pending {
+    waiting: u32,
+    identifiers: [u16; DEPTH],
+}
+
+impl Pending {
+    /// Their identifiers.
+    pub fn identifiers(&self) -> impl Iterator<Item = StandardId> {
+        let waiting = self.waiting;
+        self.identifiers
+            .iter()
+            .enumerate()
+            .filter(move |(index, _)| waiting & (1 << index) != 0)
+            .filter_map(|(_, held)| StandardId::new(*held))
     }
 }
 
