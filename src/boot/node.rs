@@ -217,7 +217,7 @@ impl NodeBoot {
             }
             State::Configure(Configure { done }) => {
                 let done = *done;
-                match network::plan(self.network, self.node).nth(usize::from(done)) {
+                match network::planned(self.network, self.node, usize::from(done)) {
                     Some(write) => {
                         let bytes = write.bytes();
                         let data = bytes.get(..write.len()).unwrap_or(&bytes);

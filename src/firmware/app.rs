@@ -78,7 +78,7 @@ mod app {
         to_network: Producer<'static, Frame>,
         answers_to: Producer<'static, Frame>,
         deadline: timers::Deadline,
-        axes: Axes,
+        axes: &'static mut Axes,
         events_to: Producer<'static, GroupEvent>,
         tick: timers::Tick,
         microseconds: timers::Microseconds,
@@ -97,6 +97,7 @@ mod app {
         known_bus: can::ErrorState,
         reset_cause: ResetCause,
         clock: timers::Microseconds,
+        boot: &'static mut NetworkBoot<AXES>,
         answers: Consumer<'static, Frame>,
         states: Consumer<'static, Frame>,
         news: Consumer<'static, News>,
@@ -106,6 +107,8 @@ mod app {
     /// Sets up the board and hands each task its part. Runs with interrupts off,
     /// before anything can be late.
     #[init(local = [
+        axes_place: Option<Axes> = None,
+        boot_place: Option<NetworkBoot<AXES>> = None,
         lengths: [[u8; TPDOS_PER_AXIS]; AXES] = [[0; TPDOS_PER_AXIS]; AXES],
         network_queue: FrameQueue = Queue::new(),
         answer_queue: FrameQueue = Queue::new(),
@@ -153,7 +156,7 @@ mod app {
                 to_network,
                 answers_to,
                 deadline: board.deadline,
-                axes: Axes::new(NETWORK, &experiment::GROUP),
+                axes: place(cx.local.axes_place, new_axes),
                 events_to,
                 tick: board.tick,
                 microseconds: board.microseconds,
@@ -172,12 +175,28 @@ mod app {
                 known_bus: can::ErrorState::Active,
                 reset_cause: board.reset_cause,
                 clock: board.microseconds,
+                boot: place(cx.local.boot_place, new_boot),
                 answers,
                 states,
                 news,
                 events,
             },
         )
+    }
+
+    /// Makes a large value where it is to stay. Not in `init` itself: what stands
+    /// in its frame lies below every interrupt's for ever.
+    #[inline(never)]
+    fn place<T>(place: &'static mut Option<T>, new: fn() -> T) -> &'static mut T {
+        place.insert(new())
+    }
+
+    fn new_axes() -> Axes {
+        Axes::new(NETWORK, &experiment::GROUP)
+    }
+
+    fn new_boot() -> NetworkBoot<AXES> {
+        NetworkBoot::new(NETWORK, Instant::ZERO)
     }
 
     /// Sleeps until the next interrupt.
@@ -470,7 +489,7 @@ mod app {
     /// resets the board.
     #[task(
         priority = 1,
-        local = [reset_cause, clock, answers, states, news, events],
+        local = [reset_cause, clock, boot, answers, states, news, events],
         shared = [od, tx_queue, control]
     )]
     async fn sdo_configurator(mut cx: sdo_configurator::Context) {
@@ -486,7 +505,7 @@ mod app {
             "silent for {=u32} ms, so that drives left running come to rest",
             NETWORK.master.silence.as_millis()
         );
-        let mut boot = NetworkBoot::<AXES>::new(NETWORK, now(*local.clock));
+        let boot = local.boot;
         loop {
             // The time first, then one frame at a time: each may cause several
             // actions, which are carried out before the next.

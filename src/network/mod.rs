@@ -4,7 +4,7 @@
 mod plan;
 pub mod sample;
 
-pub use plan::{ConfigWrite, plan};
+pub use plan::{ConfigWrite, plan, planned};
 
 use crate::id::NodeId;
 use crate::pdo::{MappingEntry, Transmission};

@@ -64,65 +64,114 @@ impl ConfigWrite {
 /// PDO switched off and the used ones mapped anew, then the start values, then
 /// error control, so that a node which got its heartbeat times got all else.
 pub fn plan(network: &'static Network, node: &'static Node) -> impl Iterator<Item = ConfigWrite> {
-    let rpdos = (1..=PDOS_PER_NODE)
-        .flat_map(move |number| pdo_writes(node.id, Direction::Receive, number, node.rpdos));
-    let tpdos = (1..=PDOS_PER_NODE)
-        .flat_map(move |number| pdo_writes(node.id, Direction::Transmit, number, node.tpdos));
+    (0..).map_while(move |n| planned(network, node, n))
+}
+
+/// The write number `n` of [`plan`], counted from 0, without going through those
+/// before it. `None` past the last.
+pub fn planned(network: &Network, node: &Node, n: usize) -> Option<ConfigWrite> {
+    let mut n = n;
+    for (direction, used) in [
+        (Direction::Receive, node.rpdos),
+        (Direction::Transmit, node.tpdos),
+    ] {
+        for number in 1..=PDOS_PER_NODE {
+            let steps = PdoSteps {
+                node: node.id,
+                direction,
+                number,
+                used: used.iter().find(|pdo| pdo.number == number),
+            };
+            if n < steps.len() {
+                return steps.get(n);
+            }
+            n -= steps.len();
+        }
+    }
+    if let Some(write) = node.start_values.get(n) {
+        return Some(*write);
+    }
     let consumer = (u32::from(network.master.node.get()) << 16) | u32::from(node.consumer_ms);
-    rpdos
-        .chain(tpdos)
-        .chain(node.start_values.iter().copied())
-        .chain([
-            ConfigWrite::u32(objects::CONSUMER_HEARTBEAT, consumer),
-            ConfigWrite::u16(objects::PRODUCER_HEARTBEAT, node.heartbeat_ms),
-        ])
+    match n - node.start_values.len() {
+        0 => Some(ConfigWrite::u32(objects::CONSUMER_HEARTBEAT, consumer)),
+        1 => Some(ConfigWrite::u16(
+            objects::PRODUCER_HEARTBEAT,
+            node.heartbeat_ms,
+        )),
+        _ => None,
+    }
 }
 
 /// The writes of one PDO. Remapping goes invalid, count 0, entries, count n,
-/// type, valid (CiA 301, 7.5.2.36 and 7.5.2.38).
-fn pdo_writes(
+/// type, inhibit time, valid (CiA 301, 7.5.2.36 and 7.5.2.38).
+struct PdoSteps {
     node: NodeId,
     direction: Direction,
     number: u8,
-    used: &'static [Pdo],
-) -> impl Iterator<Item = ConfigWrite> {
-    let offset = u16::from(number) - 1;
-    let (communication, mapping) = match direction {
-        Direction::Receive => (pdo::RPDO_COMMUNICATION, pdo::RPDO_MAPPING),
-        Direction::Transmit => (pdo::TPDO_COMMUNICATION, pdo::TPDO_MAPPING),
-    };
-    let (communication, mapping) = (communication + offset, mapping + offset);
-    let cob_id = match direction {
-        Direction::Receive => cob_id(node, direction, number),
-        Direction::Transmit => cob_id(node, direction, number).without_rtr(),
-    };
-    let at_cob_id = Address::new(communication, objects::PDO_COB_ID);
-    let count = move |n: u8| ConfigWrite::u8(Address::new(mapping, 0), n);
-    let off = ConfigWrite::u32(at_cob_id, cob_id.invalid().0);
+    /// `None`: it is only switched off.
+    used: Option<&'static Pdo>,
+}
 
-    let remapped = used
-        .iter()
-        .find(|pdo| pdo.number == number)
-        .map(move |pdo| {
-            let entries = (1..)
-                .zip(pdo.mapping)
-                .map(move |(sub, entry)| ConfigWrite::u32(Address::new(mapping, sub), entry.0));
-            let inhibit = matches!(direction, Direction::Transmit).then(|| {
-                ConfigWrite::u16(Address::new(communication, objects::PDO_INHIBIT_TIME), 0)
-            });
-            core::iter::once(count(0))
-                .chain(entries)
-                .chain([
-                    count(pdo.mapping.len() as u8),
-                    ConfigWrite::u8(
-                        Address::new(communication, objects::PDO_TRANSMISSION_TYPE),
-                        pdo.transmission.code(),
-                    ),
-                ])
-                .chain(inhibit)
-                .chain([ConfigWrite::u32(at_cob_id, cob_id.0)])
-        });
-    core::iter::once(off).chain(remapped.into_iter().flatten())
+impl PdoSteps {
+    /// Invalid and count 0.
+    const BEFORE_ENTRIES: usize = 2;
+    /// Count n, type, valid.
+    const AFTER_ENTRIES: usize = 3;
+
+    const fn has_inhibit_time(&self) -> bool {
+        matches!(self.direction, Direction::Transmit)
+    }
+
+    fn len(&self) -> usize {
+        self.used.map_or(1, |pdo| {
+            Self::BEFORE_ENTRIES
+                + pdo.mapping.len()
+                + Self::AFTER_ENTRIES
+                + usize::from(self.has_inhibit_time())
+        })
+    }
+
+    fn get(&self, n: usize) -> Option<ConfigWrite> {
+        let offset = u16::from(self.number) - 1;
+        let cob_id = cob_id(self.node, self.direction, self.number);
+        let (communication, mapping, cob_id) = match self.direction {
+            Direction::Receive => (pdo::RPDO_COMMUNICATION, pdo::RPDO_MAPPING, cob_id),
+            Direction::Transmit => (
+                pdo::TPDO_COMMUNICATION,
+                pdo::TPDO_MAPPING,
+                cob_id.without_rtr(),
+            ),
+        };
+        let parameter = |sub| Address::new(communication + offset, sub);
+        let mapped = |sub| Address::new(mapping + offset, sub);
+        if n == 0 {
+            let off = cob_id.invalid().0;
+            return Some(ConfigWrite::u32(parameter(objects::PDO_COB_ID), off));
+        }
+        let pdo = self.used?;
+        if n == 1 {
+            return Some(ConfigWrite::u8(mapped(0), 0));
+        }
+        if let Some(entry) = pdo.mapping.get(n - Self::BEFORE_ENTRIES) {
+            let sub = n - Self::BEFORE_ENTRIES + 1;
+            return Some(ConfigWrite::u32(mapped(sub as u8), entry.0));
+        }
+        match (
+            n - Self::BEFORE_ENTRIES - pdo.mapping.len(),
+            self.has_inhibit_time(),
+        ) {
+            (0, _) => Some(ConfigWrite::u8(mapped(0), pdo.mapping.len() as u8)),
+            (1, _) => Some(ConfigWrite::u8(
+                parameter(objects::PDO_TRANSMISSION_TYPE),
+                pdo.transmission.code(),
+            )),
+            (2, true) => Some(ConfigWrite::u16(parameter(objects::PDO_INHIBIT_TIME), 0)),
+            (2, false) | (3, true) => {
+                Some(ConfigWrite::u32(parameter(objects::PDO_COB_ID), cob_id.0))
+            }
+            _ => None,
+        }
+    }
 }
 
 /// The identifier of the predefined connection set (CiA 301, 7.3.5).

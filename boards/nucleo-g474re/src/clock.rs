@@ -2,7 +2,9 @@
 
 use stm32g4xx_hal::{
     pwr::{PowerConfiguration, Pwr, VoltageScale},
-    rcc::{Config, FdCanClockSource, PllConfig, PllMDiv, PllNMul, PllRDiv, PllSrc, SysClockSrc},
+    rcc::{
+        Config, FdCanClockSource, PllConfig, PllMDiv, PllNMul, PllRDiv, PllSrc, Rcc, SysClockSrc,
+    },
     time::Hertz,
 };
 
@@ -10,8 +12,10 @@ use stm32g4xx_hal::{
 pub const CRYSTAL: Hertz = Hertz::MHz(24);
 
 /// 170 MHz needs boost mode; asked for through the clock configuration alone it
-/// would be ignored.
-pub(crate) fn power(power: Pwr) -> PowerConfiguration {
+/// would be ignored. The HAL reads PWR's registers but does not switch on its
+/// clock.
+pub(crate) fn power(rcc: &Rcc, power: Pwr) -> PowerConfiguration {
+    rcc.apb1enr1().modify(|_, w| w.pwren().set_bit());
     power
         .vos(VoltageScale::Range1 { enable_boost: true })
         .freeze()

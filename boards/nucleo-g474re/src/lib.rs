@@ -81,13 +81,8 @@ pub fn setup(peripherals: pac::Peripherals, config: &Config) -> Devices {
     // First of all, so that whatever hangs below ends in a reset, too.
     let watchdog = watchdog::start(peripherals.IWDG, &peripherals.DBGMCU, config.watchdog_ms);
 
-    // The HAL reads PWR before it switches its clock on.
-    peripherals
-        .RCC
-        .apb1enr1()
-        .modify(|_, w| w.pwren().set_bit());
-    let power = clock::power(peripherals.PWR.constrain());
     let rcc = peripherals.RCC.constrain();
+    let power = clock::power(&rcc, peripherals.PWR.constrain());
     let reset_cause = reset_cause::ResetCause::from(rcc.get_reset_reason());
     let mut rcc = rcc.freeze(clock::config(), power);
     rcc.clear_reset_reason();
