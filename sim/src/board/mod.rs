@@ -10,6 +10,7 @@
 //! A board does not run by itself: [`Board::run_until`] lets it, up to a moment
 //! of virtual time or until what it offers to a CAN bus changes.
 
+mod api;
 mod clock;
 mod diagnostics;
 mod exti;
@@ -33,11 +34,12 @@ mod timer;
 #[cfg(test)]
 mod tests;
 
+pub use api::{BoardOptions, Led, Stop};
 pub use diagnostics::{Diagnostic, DiagnosticKind};
 pub use fault::{FaultKind, FaultReport};
 pub use fdcan::REQUEST_TO_START_CLOCKS;
 pub use image::{BoardError, ImageSize};
-pub use machine::{Board, BoardOptions, Led, Stop};
+pub use machine::Board;
 pub use measure::{BoardStats, IrqStats, ResetRecord};
 pub use rcc::ResetCause;
 pub use sync_probe::SyncFigures;

@@ -257,6 +257,9 @@ pub(crate) fn irq_name(irq: u8) -> String {
         6..=10 => format!("EXTI{}", irq - 6),
         23 => "EXTI9_5".to_string(),
         40 => "EXTI15_10".to_string(),
+        // No models: real-time frameworks take them for software tasks.
+        52 => "UART4".to_string(),
+        53 => "UART5".to_string(),
         _ => format!("IRQ{irq}"),
     }
 }

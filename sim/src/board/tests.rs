@@ -1,11 +1,13 @@
 //! The whole board with programs of a few hand-assembled instructions.
 
 mod faults;
+mod on_the_bus;
 mod rsemu_defects;
 mod running;
 
+use super::api::{BoardOptions, Stop};
 use super::image::{Image, ImageSize};
-use super::machine::{Board, BoardOptions, Stop};
+use super::machine::Board;
 use super::memory::FLASH_BASE;
 use crate::time::Time;
 

@@ -1,4 +1,5 @@
 use super::super::{DiagnosticKind, Led, ResetCause, irqs};
+use super::on_the_bus::{CAN1, CAN1_TX, can_program};
 use super::*;
 use crate::bus::{Event, EventKind, PortId};
 use crate::frame::WireFrame;
@@ -155,26 +156,6 @@ fn button_and_led() {
     board.set_button(true);
     board.run(Time::from_us(200));
     assert_eq!(board.word(SRAM), Some(1 << 13));
-}
-
-const CAN1: u32 = 0x4000_6400;
-const CAN1_TX: u32 = 0x4000_A400 + 0x278;
-
-/// FDCAN1 on PCLK1 = HSI 16 MHz at 1 Mbit/s (1 + 13 + 2 quanta), PA11/PA12.
-fn can_program() -> Program {
-    Program::default()
-        .store(RCC_APB1ENR1, 1 << 25)
-        .store(RCC_AHB2ENR, 1)
-        .store(0x4002_1088, 0b10 << 24)
-        .store(GPIOA, 0xABFF_FFFF & !(0b0101 << 22))
-        .store(GPIOA + 0x24, 9 << 12 | 9 << 16)
-        .store(CAN1 + 0x18, 0b11)
-        .store(CAN1 + 0x1C, 12 << 8 | 1)
-        .store(CAN1 + 0xC0, 1 << 24)
-        .store(CAN1 + 0x54, 1)
-        .store(CAN1 + 0x5C, 1)
-        .store(NVIC_ISER0, 1 << 21)
-        .store(CAN1 + 0x18, 0)
 }
 
 #[test]
