@@ -100,7 +100,7 @@ pub struct DriveConfig {
 
 impl DriveConfig {
     /// Drive `node` of the machine that `seed` describes: clock, time constant,
-    /// inertia, friction and start position are drawn from it.
+    /// inertia and friction are drawn from it.
     pub fn new(node: NodeId, seed: u64) -> DriveConfig {
         let seed = seed
             .wrapping_mul(1 << 7)
@@ -125,7 +125,8 @@ impl DriveConfig {
             plant: PlantConfig {
                 inertia_ratio: draw.between(0.7, 1.3),
                 friction_permille: draw.between(20.0, 50.0),
-                start_position: draw.between(-50_000.0, 50_000.0).round(),
+                // An incremental encoder counts from where the power came on.
+                start_position: 0.0,
                 ..PlantConfig::default()
             },
             faults: Vec::new(),
