@@ -7,6 +7,15 @@
 //! of what the image touches, register by register; a use of them that the
 //! hardware would not take becomes a [`Diagnostic`].
 //!
+//! What it cannot tell: analogue behaviour, transceivers, real oscillators
+//! starting up, flash wait states, erasing and programming of the flash. The
+//! address 0, where the hardware shows an alias of the flash, holds nothing, so
+//! that a null pointer faults.
+//!
+//! `rsemu` is built without its `std` feature: its locks are then plain flags
+//! that never wait, which is all that a board, owned by one thread at a time,
+//! needs, and a tenth faster.
+//!
 //! A board does not run by itself: [`Board::run_until`] lets it, up to a moment
 //! of virtual time or until what it offers to a CAN bus changes.
 
