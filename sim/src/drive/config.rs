@@ -67,8 +67,11 @@ const CLOCK_PPM: f64 = 100.0;
 /// Everything that describes one drive.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DriveConfig {
-    /// Its node-ID.
+    /// Its node-ID; without one (see [`unconfigured`](Self::unconfigured)),
+    /// its place in the machine.
     pub node: NodeId,
+    /// From the factory without node-ID: 2000h is 255 until LSS gives it one.
+    pub unconfigured: bool,
     /// Seed of its noise and of every latency.
     pub seed: u64,
     /// Who it says it is.
@@ -86,6 +89,12 @@ pub struct DriveConfig {
     /// Segments per block that its SDO server takes; 0: it answers block
     /// transfers with 05040001h. Unproven on the real drive.
     pub sdo_block_size: u8,
+    /// From an LSS request to its answer.
+    pub lss_latency: Spread,
+    /// How much longer saving and restoring take (1010h, 1011h).
+    pub store_time: Spread,
+    /// It has node guarding (100Ch, 100Dh), which the EPOS4 has not.
+    pub node_guarding: bool,
     /// From SYNC to the request to send the TPDOs, 50 .. 250 us.
     pub tpdo_delay: Spread,
     /// How long it stays off the bus after bus-off.
@@ -108,6 +117,7 @@ impl DriveConfig {
         let mut draw = Random::new(seed, random::SPREAD);
         DriveConfig {
             node,
+            unconfigured: false,
             seed,
             identity: Identity::epos4(FIRST_SERIAL + u32::from(node.get())),
             clock_ppm: CLOCK_PPM * draw.symmetric(),
@@ -116,6 +126,9 @@ impl DriveConfig {
             boot: Spread::new(200_000, 600_000),
             sdo_latency: Spread::new(200, 1000),
             sdo_block_size: 0,
+            lss_latency: Spread::new(200, 1000),
+            store_time: Spread::fixed(50_000),
+            node_guarding: false,
             tpdo_delay: Spread::new(50, 250),
             bus_off_pause: Spread::fixed(100_000),
             servo: ServoConfig {
@@ -145,6 +158,13 @@ impl DriveConfig {
 pub enum DriveFault {
     /// It is another device than expected.
     Identity(Identity),
+    /// Its switches are set to this node-ID, perhaps that of another drive: two
+    /// answer on one COB-ID then. They go before 2000h; takes effect with the
+    /// next reset of the communication.
+    NodeSwitches(NodeId),
+    /// Its memory for parameters is broken: 1010h and 1011h are answered with
+    /// 06060000h, LSS store with error 2.
+    StoreFails,
     /// Every SDO write to this entry is answered with this abort code.
     RefuseWrite {
         /// Index of the entry.

@@ -4,13 +4,13 @@
 use super::config::Identity;
 use super::errors::Errors;
 use super::modes::Mode;
-use super::objects::{OBJECT_COUNT, PDOS, TABLE};
-use super::pdo;
-use canmaster::id::{Address, FunctionCode};
+use super::objects::{GUARD_TIME, LIFE_TIME_FACTOR, OBJECT_COUNT, TABLE};
+use super::store::{self, UNCONFIGURED};
+use super::{bit_rate, pdo};
+use canmaster::NodeId;
+use canmaster::id::Address;
 use canmaster::od::{Chunk, Entry, ObjectDictionary, Value, Values};
-use canmaster::pdo::{Direction, PdoCobId, RPDO_COMMUNICATION, TPDO_COMMUNICATION};
 use canmaster::sdo::AbortCode;
-use canmaster::{CobId, NodeId};
 
 /// "save", as 1010h wants it.
 const SAVE: u32 = u32::from_le_bytes(*b"save");
@@ -20,10 +20,6 @@ const LOAD: u32 = u32::from_le_bytes(*b"load");
 const COMMUNICATION_AREA: (u16, u16) = (0x1000, 0x1FFF);
 /// rpm, without prefix (60A9h).
 const UNIT_RPM: u32 = 0x00B4_4700;
-/// Codes of 2001h: LSS bit rates and 9, automatic.
-const BIT_RATES: [u8; 8] = [0, 1, 2, 3, 4, 6, 7, 9];
-/// Node-ID of an unconfigured device.
-const UNCONFIGURED: u8 = 255;
 const HOMING_METHODS: [i8; 15] = [37, 34, 33, 27, 23, 18, 17, 11, 7, 2, 1, -1, -2, -3, -4];
 /// DC, sinusoidal PM, trapezoidal PM (6402h).
 const MOTOR_TYPES: [u16; 3] = [1, 10, 11];
@@ -34,8 +30,15 @@ pub struct Dictionary {
     values: Values<OBJECT_COUNT>,
     /// What the next reset loads: the factory's values or those saved.
     stored: Values<OBJECT_COUNT>,
-    node: NodeId,
+    /// The node-ID in use.
+    node: Option<NodeId>,
+    /// What the switches of the drive say; they go before 2000h.
+    pub switches: Option<NodeId>,
     identity: Identity,
+    /// 100Ch and 100Dh exist.
+    guarding: bool,
+    /// The memory for 1010h is broken.
+    pub store_fails: bool,
     /// Behind 1001h, 1003h and 603Fh.
     pub errors: Errors,
     /// Mappings cannot be changed then.
@@ -46,14 +49,17 @@ pub struct Dictionary {
 }
 
 impl Dictionary {
-    /// With the factory's values.
-    pub fn new(node: NodeId, identity: Identity) -> Dictionary {
-        let stored = factory(node, identity);
+    /// With the factory's values. `node` is what 2000h holds.
+    pub fn new(node: Option<NodeId>, identity: Identity, guarding: bool) -> Dictionary {
+        let stored = store::factory(node, identity);
         Dictionary {
             values: stored.clone(),
             stored,
-            node,
+            node: None,
+            switches: None,
             identity,
+            guarding,
+            store_fails: false,
             errors: Errors::default(),
             operational: false,
             refused: Vec::new(),
@@ -65,8 +71,51 @@ impl Dictionary {
     pub fn set_identity(&mut self, identity: Identity) {
         self.identity = identity;
         for values in [&mut self.values, &mut self.stored] {
-            put_identity(values, identity);
+            store::put_identity(values, identity);
         }
+    }
+
+    /// Who it says it is.
+    pub fn identity(&self) -> Identity {
+        self.identity
+    }
+
+    /// The node-ID in use.
+    pub fn node(&self) -> Option<NodeId> {
+        self.node
+    }
+
+    /// The node-ID that the next reset of the communication brings into use.
+    pub fn pending_node(&self) -> Option<NodeId> {
+        let set = NodeId::new(self.number(0x2000, 0) as u8);
+        self.switches.or(set)
+    }
+
+    /// A node-ID comes into use, or is taken away: identifiers of the
+    /// predefined connection set follow it, others stay.
+    pub fn use_node(&mut self, node: Option<NodeId>) {
+        for values in [&mut self.values, &mut self.stored] {
+            store::renumber(values, node);
+        }
+        self.node = node;
+    }
+
+    /// LSS gives a node-ID, or takes it away.
+    pub fn set_pending_node(&mut self, node: Option<NodeId>) {
+        self.put(0x2000, 0, node.map_or(UNCONFIGURED, NodeId::get).into());
+    }
+
+    /// LSS store configuration: 2000h and 2001h alone.
+    ///
+    /// # Errors
+    /// The memory is broken.
+    pub fn store_layer(&mut self) -> Result<(), AbortCode> {
+        check(!self.store_fails, AbortCode::HARDWARE)?;
+        for index in [0x2000, 0x2001] {
+            let number = self.number(index, 0);
+            self.stored.put(index, 0, number);
+        }
+        Ok(())
     }
 
     /// NMT reset node, power-on: everything is loaded from the store. The
@@ -129,12 +178,14 @@ impl Dictionary {
             }
             0x1010 => {
                 check(number == SAVE, AbortCode::CANNOT_STORE)?;
-                self.stored = self.values.clone();
+                check(!self.store_fails, AbortCode::HARDWARE)?;
+                store::save(&self.values, &mut self.stored);
                 return Ok(());
             }
             0x1011 => {
                 check(number == LOAD, AbortCode::CANNOT_STORE)?;
-                self.stored = factory(self.node, self.identity);
+                check(!self.store_fails, AbortCode::HARDWARE)?;
+                self.stored = store::restored(&self.stored, self.identity);
                 return Ok(());
             }
             0x1016 => self.check_consumer(sub, number)?,
@@ -142,7 +193,7 @@ impl Dictionary {
                 NodeId::new(value.as_u8()).is_some() || value.as_u8() == UNCONFIGURED,
                 AbortCode::VALUE_RANGE,
             )?,
-            0x2001 => listed(&BIT_RATES, value.as_u8())?,
+            0x2001 => check(bit_rate::exists(value.as_u8()), AbortCode::VALUE_RANGE)?,
             0x6060 => {
                 check(
                     Mode::from_code(value.as_i32() as i8).is_some(),
@@ -171,6 +222,8 @@ impl Dictionary {
 
 impl ObjectDictionary for Dictionary {
     fn entry(&self, at: Address) -> Result<Entry, AbortCode> {
+        let guard = matches!(at.index.0, GUARD_TIME | LIFE_TIME_FACTOR);
+        check(self.guarding || !guard, AbortCode::NO_SUCH_OBJECT)?;
         self.values.entry(at)
     }
 
@@ -217,48 +270,6 @@ impl ObjectDictionary for ByPdo<'_> {
         self.0.accept(at, value)?;
         self.0.written.push(at);
         Ok(())
-    }
-}
-
-/// The values of a drive that was never configured.
-fn factory(node: NodeId, identity: Identity) -> Values<OBJECT_COUNT> {
-    let mut values = Values::new(TABLE);
-    let of = |function| i64::from(CobId::of(function, node).get());
-    let mut put = |index, sub, number| {
-        let exists = values.put(index, sub, number);
-        debug_assert!(exists, "{index:04X}h:{sub:02X} is in the table");
-    };
-    put(0x1014, 0, of(FunctionCode::Emcy));
-    put(0x1200, 1, of(FunctionCode::SdoRequest));
-    put(0x1200, 2, of(FunctionCode::SdoResponse));
-    put(0x2000, 0, node.get().into());
-    for number in 0..PDOS {
-        let receive = PdoCobId::valid(pdo::default_id(Direction::Receive, number, node));
-        let transmit = PdoCobId::valid(pdo::default_id(Direction::Transmit, number, node));
-        let transmit = transmit.without_rtr();
-        // Of the TPDOs only the first is on.
-        let transmit = if number == 0 {
-            transmit
-        } else {
-            transmit.invalid()
-        };
-        put(RPDO_COMMUNICATION + number, 1, receive.0.into());
-        put(TPDO_COMMUNICATION + number, 1, transmit.0.into());
-    }
-    put_identity(&mut values, identity);
-    values
-}
-
-fn put_identity(values: &mut Values<OBJECT_COUNT>, identity: Identity) {
-    for (index, sub, number) in [
-        (0x1000, 0, identity.device_type),
-        (0x1018, 1, identity.vendor),
-        (0x1018, 2, identity.product),
-        (0x1018, 3, identity.revision),
-        (0x1018, 4, identity.serial),
-    ] {
-        let exists = values.put(index, sub, number.into());
-        debug_assert!(exists, "{index:04X}h:{sub:02X} is in the table");
     }
 }
 

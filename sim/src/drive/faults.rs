@@ -24,6 +24,8 @@ impl Drive {
     fn apply(&mut self, fault: DriveFault) {
         match fault {
             DriveFault::Identity(identity) => self.od.set_identity(identity),
+            DriveFault::NodeSwitches(node) => self.od.switches = Some(node),
+            DriveFault::StoreFails => self.od.store_fails = true,
             DriveFault::RefuseWrite { index, sub, abort } => {
                 let refusal = (Address::new(index, sub), AbortCode(abort));
                 self.od.refused.push(refusal);

@@ -1,7 +1,11 @@
 //! Power-on, resets and the way back (CiA 301, 7.3.2.2.1).
 
-use super::errors;
-use super::{Drive, Job};
+use super::guarding::Guarding;
+use super::network::Watch;
+use super::service::SdoService;
+use super::{Drive, Job, errors, layer};
+use canmaster::NodeId;
+use canmaster::nmt::Node;
 
 /// How far the drive is on its way from power-on to its services.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,6 +19,10 @@ pub(super) enum Life {
     Resetting,
     /// NMT reset communication: the axis goes on, the communication starts.
     Restarting,
+    /// Without node-ID: no NMT state, no boot-up message, nothing but LSS.
+    Unconfigured,
+    /// LSS changes the bit rate: silent, and deaf but for the bus itself.
+    Silent,
     /// All services that the NMT state allows.
     Running,
 }
@@ -31,6 +39,7 @@ impl Drive {
         self.controller.reset();
         self.axis.power_on_reset();
         self.nmt.reset();
+        self.od.use_node(None);
         self.life = Life::Off;
     }
 
@@ -40,6 +49,8 @@ impl Drive {
         self.controller.reset();
         self.axis.power_on_reset();
         self.od.reset_node();
+        self.od.use_node(None);
+        self.switch_bit_rate();
         self.nmt.reset();
         self.life = Life::Starting;
         self.plan_boot();
@@ -83,8 +94,22 @@ impl Drive {
         self.plan(self.now + self.clock.span(boot), Job::Boot);
     }
 
-    /// The boot-up message, then pre-operational.
+    /// The boot-up message, then pre-operational; without node-ID, LSS.
     pub(super) fn boot(&mut self) {
+        let node = self.od.pending_node();
+        self.od.use_node(node);
+        self.lss = layer::slave(self.od.identity(), node);
+        match node {
+            Some(node) => self.enter_network(node),
+            None => self.life = Life::Unconfigured,
+        }
+    }
+
+    fn enter_network(&mut self, node: NodeId) {
+        self.nmt = Node::new(node);
+        self.service = SdoService::new(node, self.config.sdo_block_size);
+        self.watch = Watch::new(node);
+        self.guarding = Guarding::default();
         self.life = Life::Running;
         if let Some(frame) = self.nmt.boot() {
             self.transmit(frame);

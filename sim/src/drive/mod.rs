@@ -15,6 +15,7 @@
 //! velocity.
 
 mod axis;
+mod bit_rate;
 pub mod cia402;
 mod clock;
 mod config;
@@ -23,6 +24,8 @@ mod dictionary;
 pub mod errors;
 mod exchange;
 mod faults;
+mod guarding;
+mod layer;
 mod life;
 pub mod modes;
 mod network;
@@ -34,6 +37,7 @@ mod random;
 mod service;
 pub mod servo;
 mod status;
+mod store;
 #[cfg(test)]
 mod tests;
 
@@ -45,12 +49,14 @@ use crate::bus::{BitTiming, ErrorState, Event, EventKind, Offer};
 use crate::frame::WireFrame;
 use crate::time::Time;
 use axis::Axis;
+use canmaster::lss::LssSlave;
 use canmaster::nmt::{Node, Service as NmtService};
 use canmaster::{Frame, NodeId};
 use clock::Clock;
 use controller::{Controller, QueueFull};
 use dictionary::Dictionary;
 use exchange::Exchange;
+use guarding::Guarding;
 use life::Life;
 use network::Watch;
 use random::Random;
@@ -72,6 +78,10 @@ enum Job {
     Answer(Frame),
     /// A TPDO is ready to be sent.
     Transmit(WireFrame),
+    /// LSS switches the bit rate.
+    SwitchBitRate,
+    /// The silence around it is over.
+    SpeakAgain,
     /// The pause after bus-off is over.
     BusOffOver,
     /// An error of the configuration occurs.
@@ -101,6 +111,10 @@ pub struct Drive {
     life: Life,
     lives: u32,
     nmt: Node,
+    lss: LssSlave,
+    guarding: Guarding,
+    /// bit/s, in use.
+    bit_rate: u32,
     bus_off: bool,
     controller: Controller,
     od: Dictionary,
@@ -118,7 +132,8 @@ impl Drive {
     pub fn new(config: DriveConfig) -> Drive {
         let clock = Clock::new(config.power_on, config.clock_ppm);
         let servo = Servo::new(config.servo, config.plant, config.seed);
-        let od = Dictionary::new(config.node, config.identity);
+        let node = (!config.unconfigured).then_some(config.node);
+        let od = Dictionary::new(node, config.identity, config.node_guarding);
         let mut random = Random::new(config.seed, random::LATENCY);
         // Control cycles of different drives are not in step.
         let phase = clock.span(random.integer(0, 400));
@@ -132,6 +147,9 @@ impl Drive {
             life: Life::Off,
             lives: 0,
             nmt: Node::new(config.node),
+            lss: layer::slave(config.identity, node),
+            guarding: Guarding::default(),
+            bit_rate: config.bit_rate,
             bus_off: false,
             controller: Controller::default(),
             od,
@@ -148,7 +166,7 @@ impl Drive {
         drive
     }
 
-    /// Its node-ID.
+    /// Its node-ID as configured: its place in the machine.
     pub fn node(&self) -> NodeId {
         self.config.node
     }
@@ -185,7 +203,7 @@ impl Drive {
     /// Its bit timing; `None` while it takes no part in the bus.
     pub fn timing(&self) -> Option<BitTiming> {
         let off = matches!(self.life, Life::Off | Life::Starting) || self.bus_off;
-        (!off).then(|| BitTiming::new(self.config.bit_rate, self.config.clock_ppm))
+        (!off).then(|| BitTiming::new(self.bit_rate, self.config.clock_ppm))
     }
 
     /// The next moment at which it may have something new to say.
@@ -248,6 +266,8 @@ impl Drive {
             Job::Serve => self.serve(),
             Job::Answer(frame) => self.transmit(frame),
             Job::Transmit(frame) => self.send_tpdo(frame),
+            Job::SwitchBitRate => self.switch_bit_rate(),
+            Job::SpeakAgain => self.speak_again(),
             Job::BusOffOver => self.bus_off_over(),
             Job::Error { code, lasting } => self.raise(code, lasting),
             Job::CauseGone(code) => self.cause_gone(code),
@@ -255,9 +275,11 @@ impl Drive {
     }
 
     fn on_frame(&mut self, frame: &Frame) {
+        self.on_layer_frame(frame);
         if self.life != Life::Running {
             return;
         }
+        self.on_guard_request(frame);
         self.on_network_frame(frame);
         self.on_process_frame(frame);
         self.on_service_frame(frame);

@@ -49,6 +49,7 @@ impl Drive {
         let timers = consumers
             .filter_map(|(_, consumer)| consumer.next_deadline())
             .chain(self.watch.producer.next_deadline())
+            .chain(self.life_guard_deadline())
             .chain(self.service.next_deadline().filter(|_| self.answer_fits()));
         timers.min().map(|instant| self.clock.when(instant))
     }
@@ -65,10 +66,11 @@ impl Drive {
         if lost {
             self.connection_lost(errors::HEARTBEAT);
         }
+        self.poll_life_guard();
         self.poll_server();
     }
 
-    fn heartbeat_lost(&self) -> bool {
+    pub(super) fn heartbeat_lost(&self) -> bool {
         let since = |fault: &DriveFault| match *fault {
             DriveFault::HeartbeatLost { at } => self.now >= at,
             _ => false,

@@ -12,6 +12,10 @@ use canmaster::pdo::{RPDO_COMMUNICATION, RPDO_MAPPING, TPDO_COMMUNICATION, TPDO_
 
 /// RPDOs and TPDOs of the drive, each.
 pub const PDOS: u16 = 4;
+/// Guard time in milliseconds: only where a drive is said to have it.
+pub const GUARD_TIME: u16 = 0x100C;
+/// Life time factor: guard times until the master counts as lost.
+pub const LIFE_TIME_FACTOR: u16 = 0x100D;
 /// Entries of one mapping.
 pub const MAPPING_ENTRIES: u8 = 12;
 
@@ -89,6 +93,8 @@ const COMMUNICATION: &[Object] = &[
     Object::ro(0x1003, 5, Unsigned32, 0),
     Object::constant(0x1005, 0, Unsigned32, 0x80),
     Object::string(0x1008, 0, "EPOS4"),
+    Object::rw(GUARD_TIME, 0, Unsigned16, 0),
+    Object::rw(LIFE_TIME_FACTOR, 0, Unsigned8, 0),
     Object::constant(0x1010, 0, Unsigned8, 1),
     Object::rw(0x1010, 1, Unsigned32, 1),
     Object::constant(0x1011, 0, Unsigned8, 4),

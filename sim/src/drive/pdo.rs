@@ -30,14 +30,14 @@ const fn mapping(direction: Direction) -> u16 {
     }
 }
 
-/// Identifier of PDO `number` (from 0) in the predefined connection set.
-pub(super) fn default_id(direction: Direction, number: u16, node: NodeId) -> CobId {
+/// Function of PDO `number` (from 0) in the predefined connection set.
+pub(super) fn function(direction: Direction, number: u16) -> FunctionCode {
     use FunctionCode::*;
     let functions = match direction {
         Direction::Receive => [Rpdo1, Rpdo2, Rpdo3, Rpdo4],
         Direction::Transmit => [Tpdo1, Tpdo2, Tpdo3, Tpdo4],
     };
-    CobId::of(functions[usize::from(number % PDOS)], node)
+    functions[usize::from(number % PDOS)]
 }
 
 /// A PDO that exists, ready to pack and unpack.
@@ -104,7 +104,7 @@ impl Pdo {
 /// The abort code of the drive.
 pub(super) fn check(
     od: &Dictionary,
-    node: NodeId,
+    node: Option<NodeId>,
     at: Address,
     number: u32,
 ) -> Result<(), AbortCode> {
@@ -135,11 +135,11 @@ pub(super) fn check(
     Ok(())
 }
 
-fn check_cob_id(new: PdoCobId, old: PdoCobId, node: NodeId) -> Result<(), AbortCode> {
+fn check_cob_id(new: PdoCobId, old: PdoCobId, node: Option<NodeId>) -> Result<(), AbortCode> {
     new.may_replace(old)?;
     match new.id().and_then(CobId::split) {
         // Seen in the field: the identifier of another node.
-        Some((_, owner)) if owner != node => Err(AbortCode::NOT_MAPPABLE),
+        Some((_, owner)) if Some(owner) != node => Err(AbortCode::NOT_MAPPABLE),
         _ => Ok(()),
     }
 }

@@ -17,6 +17,9 @@ use std::collections::VecDeque;
 const QUEUE: usize = 8;
 /// After this the server gives up a transfer that stands still.
 const TIMEOUT: Duration = Duration::from_millis(1000);
+/// First byte of an expedited download, the size aside.
+const DOWNLOAD: u8 = 0x22;
+const DOWNLOAD_MASK: u8 = 0xE2;
 /// First byte of an abort.
 const ABORT: u8 = 0x80;
 /// First byte of the answer that opens a block download, whatever its CRC bit.
@@ -91,7 +94,11 @@ impl Drive {
     }
 
     fn plan_serving(&mut self) {
-        let at = self.now + self.latency();
+        let mut at = self.now + self.latency();
+        if self.service.waiting.front().is_some_and(is_store) {
+            let us = self.config.store_time.draw(&mut self.random);
+            at += self.clock.span(us);
+        }
         self.plan(at, Job::Serve);
     }
 
@@ -167,6 +174,13 @@ impl Drive {
 
 /// The last object of the PDO parameters.
 const LAST_PDO_OBJECT: u16 = TPDO_MAPPING + PDOS - 1;
+
+/// Whether a request writes to 1010h or 1011h, expedited: that takes longer.
+fn is_store(request: &Frame) -> bool {
+    let [command, low, high, ..] = request.padded();
+    let index = u16::from_le_bytes([low, high]);
+    command & DOWNLOAD_MASK == DOWNLOAD && matches!(index, 0x1010 | 0x1011)
+}
 
 /// The EPOS4 has one code for a length that does not fit from above.
 fn as_epos4(answer: Frame) -> Frame {

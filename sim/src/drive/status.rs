@@ -13,9 +13,11 @@ const MOVING_RPM: f64 = 5.0;
 /// The drive at this moment, as it sees itself.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DriveStatus {
-    /// Its node-ID.
+    /// Its node-ID as configured: its place in the machine.
     pub node: NodeId,
-    /// NMT state; initialising while it has no supply.
+    /// The node-ID in use; `None` before the boot-up message, and without one.
+    pub node_id: Option<NodeId>,
+    /// NMT state; initialising while it has no supply or no node-ID.
     pub nmt: NmtState,
     /// State of CiA 402.
     pub state: cia402::State,
@@ -57,6 +59,7 @@ impl Drive {
         let errors = &self.od.errors;
         DriveStatus {
             node: self.config.node,
+            node_id: self.od.node(),
             nmt: self.nmt.state(),
             state: self.axis.state(),
             statusword: self.axis.statusword(self.od.operational, errors.warning()),

@@ -1,8 +1,8 @@
 //! Power-on, NMT, heartbeat, determinism.
 
 use super::rig::{Rig, config, node, quick};
-use crate::drive::DriveConfig;
 use crate::drive::cia402::State;
+use crate::drive::{DriveConfig, DriveFault};
 use crate::time::Time;
 use canmaster::nmt::State as Nmt;
 
@@ -175,4 +175,16 @@ fn drives_differ_within_what_is_stated() {
     taus.sort_by(f64::total_cmp);
     assert!(taus[0] < 0.004 && taus[49] > 0.009);
     assert_ne!(config(1).clock_ppm, config(2).clock_ppm);
+}
+
+#[test]
+fn two_drives_can_have_one_node_id() {
+    let mut rig = Rig::new([quick(3), quick(4).with(DriveFault::NodeSwitches(node(3)))]);
+    rig.run_ms(300);
+    assert_eq!(rig.sent(0x703).len(), 2);
+    rig.log.clear();
+    rig.sdo_of(3, [0x40, 0x18, 0x10, 4, 0, 0, 0, 0]);
+    let answers = rig.sent(0x583);
+    assert_eq!(answers.len(), 2);
+    assert_ne!(answers[0], answers[1], "two serial numbers");
 }

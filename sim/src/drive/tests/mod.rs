@@ -2,8 +2,11 @@
 
 mod boot;
 mod faults;
+mod guarding;
+mod layer;
 mod motion;
 mod objects;
 mod on_bus;
 mod process;
 mod rig;
+mod storing;

@@ -273,3 +273,23 @@ fn a_cable_cut_ends_in_error_passive_and_standstill() {
         .expect("its EMCY");
     assert_eq!(told.2[..3], [0x20, 0x81, 0x10]);
 }
+
+#[test]
+fn two_servers_with_one_identifier_disturb_each_other_but_nobody_is_lost() {
+    // Both answer after exactly 200 us of nearly equal clocks: the same
+    // identifier at the same time with other data is a bit error.
+    let exact = |id| DriveConfig {
+        clock_ppm: 0.0,
+        ..quick(id)
+    };
+    let twin = exact(4).with(DriveFault::NodeSwitches(node(3)));
+    let mut net = Net::new([exact(3), twin]);
+    net.run_ms(300);
+    net.log.clear();
+    net.errors = 0;
+    net.send(0x603, &[0x40, 0x18, 0x10, 4, 0, 0, 0, 0]);
+    net.run_ms(50);
+    let answers = net.log.iter().filter(|(_, id, _)| *id == 0x583);
+    assert_eq!(answers.count(), 2, "{:?}", net.log);
+    assert!(net.errors > 0);
+}

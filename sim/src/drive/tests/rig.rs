@@ -28,6 +28,7 @@ pub(super) fn quick(id: u8) -> DriveConfig {
     DriveConfig {
         boot: Spread::fixed(200_000),
         sdo_latency: Spread::fixed(200),
+        store_time: Spread::fixed(0),
         ..config(id)
     }
 }
