@@ -495,7 +495,7 @@ mod app {
     async fn sdo_configurator(mut cx: sdo_configurator::Context) {
         let local = cx.local;
         let mut wake = wake::reader();
-        let mut log = Log::new();
+        let mut log = Log::new(NETWORK);
         defmt::info!(
             "canmaster {=str}, started by: {=str}",
             env!("CARGO_PKG_VERSION"),

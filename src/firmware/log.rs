@@ -7,6 +7,7 @@ use canmaster::{
     boot::Event,
     master::{Notice, Report},
     motion::{FaultCause, GroupEvent, GroupState},
+    network::Network,
 };
 use defmt::{Display2Format, error, info, warn};
 use nucleo_g474re::can::ErrorState;
@@ -21,14 +22,18 @@ pub(crate) enum News {
 
 /// Writes the log.
 pub(crate) struct Log {
+    network: &'static Network,
     /// The first fault is the error; what follows from it is a warning, so that
     /// the last error line is the reason.
     faulted: bool,
 }
 
 impl Log {
-    pub(crate) const fn new() -> Log {
-        Log { faulted: false }
+    pub(crate) const fn new(network: &'static Network) -> Log {
+        Log {
+            network,
+            faulted: false,
+        }
     }
 
     /// A step of the boot-up.
@@ -98,7 +103,17 @@ impl Log {
             } => {
                 warn!("{}", Display2Format(event));
             }
-            GroupEvent::Fault { .. } => self.fault(format_args!("{event}")),
+            GroupEvent::Fault {
+                axis: Some(axis),
+                cause,
+            } => match self.network.nodes.get(usize::from(*axis)) {
+                Some(node) => self.fault(format_args!(
+                    "node {} ({}): {cause}; then reset the board",
+                    node.id, node.name
+                )),
+                None => self.fault(format_args!("{event}")),
+            },
+            GroupEvent::Fault { .. } => self.fault(format_args!("{event}; then reset the board")),
             GroupEvent::State {
                 to: GroupState::Standby,
                 ..
