@@ -5,8 +5,8 @@
 //! | 5 | `sync_tick` | TIM2 update, every cycle |
 //! | 4 | `can_irq` | FDCAN1 line 0, and pended when there is something to send |
 //! | 3 | `pdo_producer` | pended by the last TPDO, or TIM3 compare at the deadline |
-//! | 2 | `network` | TIM7, every millisecond, and pended by `can_irq` |
-//! | 1 | `sdo_configurator` | woken by `network` |
+//! | 2 | `network` | TIM7, every millisecond |
+//! | 1 | `sdo_configurator` | woken by `can_irq` and `network` |
 //! | 0 | `idle` | sleeps |
 //!
 //! | resource | ceiling | held for |
@@ -264,6 +264,7 @@ mod app {
             }
         }
 
+        let mut answered = false;
         while let Some(element) = can_rx
             .receive(can::Fifo::Fifo0)
             .or_else(|| can_rx.receive(can::Fifo::Fifo1))
@@ -289,14 +290,16 @@ mod app {
                 }
                 Handler::Emcy | Handler::ErrorControl => {
                     queue(to_network, element.frame());
-                    rtic::pend(Interrupt::TIM7);
                 }
                 Handler::SdoResponse => {
                     queue(answers_to, element.frame());
-                    wake::want();
-                    rtic::pend(Interrupt::TIM7);
+                    answered = true;
                 }
             }
+        }
+
+        if answered {
+            wake::now();
         }
 
         loop {
@@ -347,7 +350,10 @@ mod app {
     )]
     fn pdo_producer(mut cx: pdo_producer::Context) {
         let deadline = cx.local.deadline.take();
-        roll::check_in(Task::PdoProducer);
+        if deadline {
+            // Once per period, whatever else pends the task.
+            roll::check_in(Task::PdoProducer);
+        }
         let Some(cycle) = cx.shared.od.lock(|od| od.take_cycle(deadline)) else {
             return;
         };
@@ -379,8 +385,7 @@ mod app {
 
     /// Error control both ways, emergencies, button, LEDs, and the watchdog.
     ///
-    /// Trigger: TIM7, every millisecond, or pended by `can_irq` for a frame.
-    /// Budget: 5 000 cycles. If it is late, so is the reaction to a lost node; a
+    /// Trigger: TIM7, every millisecond. Budget: 5 000 cycles. If it is late, so is the reaction to a lost node; a
     /// heartbeat missing for 200 ms stops the drives; after 100 ms without it
     /// the watchdog resets the board.
     #[task(
@@ -394,10 +399,11 @@ mod app {
     )]
     fn network(mut cx: network::Context) {
         let local = cx.local;
+        local.tick.acknowledge();
         let counter = local.microseconds.now();
         CLOCK.keep(counter);
         let now = CLOCK.now(|| counter);
-        let tick = local.tick.take();
+        *local.milliseconds = local.milliseconds.wrapping_add(1);
 
         while let Some(frame) = local.from_can.dequeue() {
             if let Some((FunctionCode::ErrorControl, _)) = frame.id().split() {
@@ -408,56 +414,53 @@ mod app {
                 tell(report, local.news_to, &mut cx.shared.control);
             }
         }
-        if tick {
-            *local.milliseconds = local.milliseconds.wrapping_add(1);
-            while let Some(report) = local.supervisor.poll(now) {
-                tell(report, local.news_to, &mut cx.shared.control);
-            }
-            let bus = cx.shared.bus.lock(|bus| *bus);
-            let pressed = local.debounce.press(local.button.is_pressed());
-            let control = cx.shared.control.lock(|control| {
-                control.pressed |= pressed;
-                control.bus_off |= bus == can::ErrorState::BusOff;
-                *control
-            });
-            if bus != *local.known_bus {
-                *local.known_bus = bus;
-                publish(local.news_to, News::ErrorState(bus));
-            }
-            if control.network_ready {
-                local.supervisor.arm();
-            }
-            if control.speaking && local.heartbeat.next_deadline().is_none() {
-                local.heartbeat.set_period(NETWORK.master.heartbeat, now);
-            }
-            if let Some(frame) = local.heartbeat.poll(now, control.state())
-                && !control.bus_off
-            {
-                // A full queue counts it.
-                let _ = cx.shared.tx_queue.lock(|queue| queue.put(frame));
-            }
-            if local.milliseconds.is_multiple_of(design::LED_MS) {
-                let lost = local.supervisor.any_lost();
-                local.run_led.set(leds::run(&control, now));
-                local.error_led.set(leds::error(&control, bus, lost, now));
-            }
-            if local.milliseconds.is_multiple_of(design::COUNTS_MS) {
-                let overruns = cx.shared.od.lock(|od| od.overruns());
-                let overflows = cx.shared.tx_queue.lock(|queue| queue.overflows());
-                let counts = Counts::now(overruns, overflows);
-                if counts != *local.counts {
-                    *local.counts = counts;
-                    publish(local.news_to, News::Counts(counts));
-                }
-            }
-            // Sends the heartbeat, and shows that it is alive.
-            rtic::pend(Interrupt::FDCAN1_IT0);
+        while let Some(report) = local.supervisor.poll(now) {
+            tell(report, local.news_to, &mut cx.shared.control);
         }
+        let bus = cx.shared.bus.lock(|bus| *bus);
+        let pressed = local.debounce.press(local.button.is_pressed());
+        let control = cx.shared.control.lock(|control| {
+            control.pressed |= pressed;
+            control.bus_off |= bus == can::ErrorState::BusOff;
+            *control
+        });
+        if bus != *local.known_bus {
+            *local.known_bus = bus;
+            publish(local.news_to, News::ErrorState(bus));
+        }
+        if control.network_ready {
+            local.supervisor.arm();
+        }
+        if control.speaking && local.heartbeat.next_deadline().is_none() {
+            local.heartbeat.set_period(NETWORK.master.heartbeat, now);
+        }
+        if let Some(frame) = local.heartbeat.poll(now, control.state())
+            && !control.bus_off
+        {
+            // A full queue counts it.
+            let _ = cx.shared.tx_queue.lock(|queue| queue.put(frame));
+        }
+        if local.milliseconds.is_multiple_of(design::LED_MS) {
+            let lost = local.supervisor.any_lost();
+            local.run_led.set(leds::run(&control, now));
+            local.error_led.set(leds::error(&control, bus, lost, now));
+        }
+        if local.milliseconds.is_multiple_of(design::COUNTS_MS) {
+            let overruns = cx.shared.od.lock(|od| od.overruns());
+            let overflows = cx.shared.tx_queue.lock(|queue| queue.overflows());
+            let counts = Counts::now(overruns, overflows);
+            if counts != *local.counts {
+                *local.counts = counts;
+                publish(local.news_to, News::Counts(counts));
+            }
+        }
+        // Sends the heartbeat, and shows that it is alive.
+        rtic::pend(Interrupt::FDCAN1_IT0);
         wake::if_due(counter);
+        roll::check_in(Task::Network);
         if roll::complete() {
             local.watchdog.feed();
         }
-        roll::check_in(Task::Network);
     }
 
     /// Hands a report to the log, and a fault to the group.

@@ -1,5 +1,6 @@
-//! When `sdo_configurator` runs: `network` wakes it, at the time that it asked
-//! for or when there is something to do.
+//! When `sdo_configurator` runs: `can_irq` wakes it for an answer to one of its
+//! SDO requests, `network` when there is something to log and at the time that
+//! it asked for.
 
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use rtic_sync::signal::{Signal, SignalReader};
@@ -14,11 +15,15 @@ pub(crate) fn reader() -> SignalReader<'static, ()> {
     SIGNAL.take_reader()
 }
 
-/// Asks `network` to wake the configurator at its next run. For interrupt tasks:
-/// a store, no more.
+/// Asks `network` to wake the configurator at its next run: a store, no more.
 #[inline(always)]
 pub(crate) fn want() {
     WANTED.store(true, Ordering::Relaxed);
+}
+
+/// Wakes it at once. Takes two critical sections of some 40 cycles.
+pub(crate) fn now() {
+    SIGNAL.writer().write(());
 }
 
 /// Asks for it at a time, in microseconds modulo 2^32.
@@ -26,12 +31,11 @@ pub(crate) fn at(us: u32) {
     AT.store(us, Ordering::Relaxed);
 }
 
-/// Wakes the configurator if it is time. For `network` alone: the signal takes
-/// short critical sections that the interrupt tasks above should not pay for.
+/// Wakes the configurator if it is time, or was asked for.
 pub(crate) fn if_due(now_us: u32) {
     let late = now_us.wrapping_sub(AT.load(Ordering::Relaxed));
     let due = late <= u32::MAX / 2;
     if WANTED.swap(false, Ordering::Relaxed) || due {
-        SIGNAL.writer().write(());
+        now();
     }
 }

@@ -29,13 +29,15 @@ impl Period {
 pub struct Deadline(pac::TIM3);
 
 impl Deadline {
-    /// Whether the deadline has passed since the last call.
+    /// Whether the deadline of *this* period has passed since the last call. A
+    /// compare event that was not looked at before its period was over is
+    /// forgotten.
     pub fn take(&mut self) -> bool {
         if self.0.sr().read().cc1if().bit_is_clear() {
             return false;
         }
         self.0.sr().write(|w| w.cc1if().clear_bit());
-        true
+        self.0.cnt().read().cnt().bits() >= self.0.ccr1().read().ccr().bits() as u16
     }
 }
 
@@ -43,13 +45,9 @@ impl Deadline {
 pub struct Tick(pac::TIM7);
 
 impl Tick {
-    /// Whether a millisecond has passed since the last call.
-    pub fn take(&mut self) -> bool {
-        if self.0.sr().read().uif().bit_is_clear() {
-            return false;
-        }
+    /// Acknowledges the update event.
+    pub fn acknowledge(&mut self) {
         self.0.sr().write(|w| w.uif().clear_bit());
-        true
     }
 }
 
