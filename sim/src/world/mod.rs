@@ -1,11 +1,13 @@
 //! Board, bus and drives together in virtual time, with the person who presses
 //! the button.
 
+mod bench;
 mod image;
 mod operator;
 mod program;
 mod record;
 mod scenario;
+mod steps;
 mod stimulus;
 pub mod trials;
 mod watch;
@@ -17,29 +19,20 @@ pub use scenario::{Ailment, Scenario};
 pub use stimulus::Stimulus;
 pub use watch::Startup;
 
-use canmaster::{NodeId, nmt};
-
+use canmaster::nmt;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-use crate::board::{Board, BoardError, BoardOptions, Stop};
+use crate::board::{Board, BoardError, BoardOptions, ResetCause};
 use crate::bus::{BitTiming, Bus, Event, PortId, WireRecord};
-use crate::drive::{Drive, DriveConfig, DriveFault, DriveStatus, PlantState, cia402};
+use crate::drive::{Drive, DriveConfig, DriveStatus, cia402};
 use crate::judge::Assignment;
 use crate::log::{LogDecoder, LogLine};
 use crate::time::Time;
-use operator::{Operator, View};
+use operator::Operator;
 use record::Seen;
 use stimulus::Agenda;
-use watch::{AxisTruth, Watch};
-
-/// How often the machine is looked at: truth of the plant, log, operator.
-const LOOK: Time = Time::from_us(200);
-/// The board's only CAN controller in use.
-const FDCAN1: usize = 0;
-/// After a complaint of the firmware and standstill, how long it may go on to
-/// say why.
-const LAST_WORDS: Time = Time::from_ms(200);
+use watch::Watch;
 
 /// Keeps the board's random numbers apart from everybody else's.
 const BOARD_STREAM: u64 = 0x0B0A_4D00;
@@ -186,294 +179,11 @@ impl<'i> World<'i> {
         true
     }
 
-    /// Does something to the machine now.
-    pub fn apply(&mut self, stimulus: Stimulus) {
-        match stimulus {
-            Stimulus::Button(pressed) => self.board.set_button(pressed),
-            Stimulus::Reset(true) => {
-                self.watch.revoke();
-                self.decoder.restart();
-                self.board.hold_in_reset();
-            }
-            Stimulus::Reset(false) => self.board.release_reset(),
-            Stimulus::BlockIrq { irq, blocked } => self.board.block_irq(irq, blocked),
-            Stimulus::DelayIrq { irq, max_cycles } => {
-                self.board.delay_irq(irq, max_cycles, self.scenario.seed);
-            }
-            Stimulus::Silence { node } => self.silence(node),
-            Stimulus::Bus(fault) => self.bus.inject(fault),
-        }
-    }
-
-    /// Does something to the machine later.
-    pub fn schedule(&mut self, at: Time, stimulus: Stimulus) {
-        self.agenda.add(at, stimulus);
-    }
-
-    /// Presses the button with bouncing contacts and lets it go again. In
-    /// standby that is a release, in motion a stop.
-    pub fn press(&mut self) {
-        if self.watch.ready() {
-            self.watch.release(self.now);
-        } else {
-            self.watch.revoke();
-        }
-        let mut presses = Vec::new();
-        self.operator.press(self.now, &mut presses);
-        for (at, stimulus) in presses {
-            self.agenda.add(at, stimulus);
-        }
-    }
-
-    /// The present moment.
-    pub fn now(&self) -> Time {
-        self.now
-    }
-
-    /// When the scenario ends.
-    pub fn end(&self) -> Time {
-        self.scenario.end
-    }
-
-    /// All drives are enabled and at rest: a press of the button releases
-    /// motion.
-    pub fn ready(&self) -> bool {
-        self.watch.ready()
-    }
-
-    /// No axis moves.
-    pub fn at_rest(&self) -> bool {
-        self.watch.at_rest()
-    }
-
-    /// All axes turn.
-    pub fn in_full_motion(&self) -> bool {
-        self.truths()
-            .flatten()
-            .all(|truth| watch::is_full_motion(truth.velocity_rpm))
-    }
-
-    /// What is true of each axis; `None`: not on the bus.
-    pub fn truths(&self) -> impl Iterator<Item = Option<PlantState>> + '_ {
-        self.stations
-            .iter()
-            .map(|station| station.as_ref().map(|station| station.drive.truth()))
-    }
-
-    /// What each drive is in; `None`: not on the bus.
-    pub fn statuses(&self) -> impl Iterator<Item = Option<DriveStatus>> + '_ {
-        self.stations
-            .iter()
-            .map(|station| station.as_ref().map(|station| station.drive.status()))
-    }
-
-    /// Round trips that were finished, and whether one is going on.
-    pub fn round_trips(&self) -> (usize, bool) {
-        let done = self
-            .watch
-            .releases
-            .iter()
-            .filter(|release| release.done.is_some())
-            .count();
-        let going_on = self
-            .watch
-            .releases
-            .last()
-            .is_some_and(|release| release.done.is_none() && !release.revoked);
-        (done, going_on)
-    }
-
-    /// What was on the wire so far.
-    pub fn wire(&self) -> &[WireRecord] {
-        &self.wire
-    }
-
-    /// The firmware's log so far.
-    pub fn log(&self) -> &[(Time, LogLine)] {
-        &self.log
-    }
-
-    /// The emulated board.
-    pub fn board(&self) -> &Board {
-        &self.board
-    }
-
-    /// One step of the event loop, at most until `limit`.
-    fn step(&mut self, limit: Time, observer: &mut dyn Observer) {
-        while let Some(stimulus) = self.agenda.due(self.now) {
-            self.apply(stimulus);
-        }
-        let until = self.next_moment().min(limit).max(self.now);
-        let reached = match self.board.run_until(until) {
-            Stop::Reached => until,
-            // What the board would send has changed: the bus has to know
-            // before it goes on.
-            Stop::CanChanged => self.board.now().clamp(self.now, until),
-            Stop::Fault(report) => {
-                self.complained.get_or_insert(self.now);
-                self.halted
-                    .get_or_insert_with(|| format!("the firmware crashed: {report}"));
-                until
-            }
-        };
-        self.now = reached;
-        self.offer_board();
-        self.advance_bus();
-        self.advance_drives();
-        if self.now >= self.next_look {
-            self.next_look = self.now + LOOK;
-            self.look(observer);
-        }
-    }
-
-    /// When something happens next that is not the board's doing.
-    fn next_moment(&self) -> Time {
-        let deadlines = self
-            .stations
-            .iter()
-            .flatten()
-            .map(|station| station.drive.next_deadline());
-        [
-            self.bus.next_event(),
-            self.agenda.next(),
-            Some(self.next_look),
-        ]
-        .into_iter()
-        .flatten()
-        .chain(deadlines)
-        .min()
-        .unwrap_or(self.next_look)
-    }
-
-    fn offer_board(&mut self) {
-        let timing = self.board.can_timing(FDCAN1);
-        if timing != self.board_timing {
-            self.board_timing = timing;
-            self.bus.set_timing(self.board_port, timing, self.now);
-        }
-        self.bus
-            .offer(self.board_port, self.board.can_offer(FDCAN1));
-    }
-
-    fn advance_bus(&mut self) {
-        let mut events = std::mem::take(&mut self.events);
-        self.bus.advance(self.now, &mut events);
-        for event in &events {
-            if event.port == self.board_port {
-                self.board.can_event(FDCAN1, event);
-            } else if let Some(station) = self
-                .stations
-                .iter_mut()
-                .flatten()
-                .find(|station| station.port == event.port)
-            {
-                station.drive.on_event(event);
-            }
-        }
-        if !events.is_empty() {
-            self.offer_board();
-        }
-        events.clear();
-        self.events = events;
-    }
-
-    fn advance_drives(&mut self) {
-        for station in self.stations.iter_mut().flatten() {
-            if station.drive.next_deadline() <= self.now {
-                station.drive.advance(self.now);
-            }
-            let timing = station.drive.timing();
-            if timing != station.timing {
-                station.timing = timing;
-                self.bus.set_timing(station.port, timing, self.now);
-            }
-            self.bus.offer(station.port, station.drive.offer());
-        }
-    }
-
-    fn look(&mut self, observer: &mut dyn Observer) {
-        self.wire.extend(self.bus.take_records());
-        self.read_log(observer);
-        for station in self.stations.iter_mut().flatten() {
-            // Control cycles that nobody waits for have not been worked out yet.
-            station.drive.advance(self.now);
-        }
-        let truth: Vec<Option<AxisTruth>> = self
-            .stations
-            .iter()
-            .map(|station| station.as_ref().map(|station| axis_truth(&station.drive)))
-            .collect();
-        if self.watch.sample(self.now, &truth) {
-            self.operator.trip_done();
-        }
-        if self.watch.full_motion() {
-            for stimulus in std::mem::take(&mut self.in_motion) {
-                self.apply(stimulus);
-            }
-        }
-        self.operate();
-        observer.look(self);
-    }
-
-    fn read_log(&mut self, observer: &mut dyn Observer) {
-        self.rtt.clear();
-        self.board.drain_rtt(&mut self.rtt);
-        self.decoder.decode(&self.rtt, &mut self.lines);
-        for line in self.lines.drain(..) {
-            observer.log(self.now, &line);
-            if line.level == Some(crate::log::Level::Error) && self.complained.is_none() {
-                self.complained = Some(self.now);
-                self.watch.revoke();
-            }
-            self.log.push((self.now, line));
-        }
-    }
-
-    fn operate(&mut self) {
-        let view = View {
-            now: self.now,
-            ready: self.watch.ready(),
-            round_trip: self.watch.round_trip().or_else(round_trip),
-            end: self.scenario.end,
-        };
-        let mut presses = Vec::new();
-        if self.operator.look(view, &mut presses) {
-            self.watch.release(self.now);
-        }
-        for (at, stimulus) in presses {
-            self.agenda.add(at, stimulus);
-        }
-    }
-
-    fn silence(&mut self, node: NodeId) {
-        let at = self.now;
-        let station = network()
-            .find(node)
-            .and_then(|(axis, _)| self.stations[axis].as_mut());
-        if let Some(station) = station {
-            station.drive.inject(DriveFault::HeartbeatLost { at });
-            station.drive.inject(DriveFault::TpdosLost { at });
-            station.drive.inject(DriveFault::SdoDead { at });
-        }
-    }
-
-    /// Nothing more is to be expected.
-    fn over(&self) -> bool {
-        self.complained
-            .is_some_and(|since| self.now >= since + LAST_WORDS)
-            && self.watch.at_rest()
-    }
-
     /// Ends the run and judges it.
     pub fn finish(mut self) -> Record {
         self.wire.extend(self.bus.take_records());
         let unfinished = self.unfinished();
-        let complaints = self
-            .halted
-            .iter()
-            .cloned()
-            .chain(self.board.diagnostics().iter().map(ToString::to_string))
-            .collect();
+        let complaints = self.complaints();
         let axes = network()
             .nodes
             .iter()
@@ -498,6 +208,30 @@ impl<'i> World<'i> {
             unfinished,
         }
         .judge(&self.assignment, &traffic())
+    }
+
+    /// What the board has noticed: crashes, resets that nobody ordered, wrong
+    /// use of its registers.
+    fn complaints(&self) -> Vec<String> {
+        let resets = self.board.stats().resets;
+        let ordered = [ResetCause::PowerOn, ResetCause::Pin];
+        let resets = resets
+            .iter()
+            .filter(|reset| !ordered.contains(&reset.cause))
+            .map(|reset| {
+                let cause = match reset.cause {
+                    ResetCause::Watchdog => "the watchdog: a task hung, or the program crashed",
+                    _ => "the program itself",
+                };
+                format!("the board was reset at {} s by {cause}", reset.at)
+            });
+        let diagnostics = self.board.diagnostics().iter().map(ToString::to_string);
+        self.halted
+            .iter()
+            .cloned()
+            .chain(resets)
+            .chain(diagnostics)
+            .collect()
     }
 
     /// Why there was no (further) round trip, for a person.
@@ -539,15 +273,4 @@ pub fn operational(status: &DriveStatus) -> bool {
 /// The drive is in operation enabled.
 pub fn enabled(status: &DriveStatus) -> bool {
     status.state == cia402::State::OperationEnabled
-}
-
-fn axis_truth(drive: &Drive) -> AxisTruth {
-    let truth = drive.truth();
-    let status = drive.status();
-    AxisTruth {
-        position: truth.position_inc,
-        velocity: truth.velocity_rpm,
-        operational: operational(&status),
-        enabled: enabled(&status),
-    }
 }

@@ -1,0 +1,137 @@
+//! What can be seen of the machine and done to it from outside.
+
+use canmaster::NodeId;
+
+use super::stimulus::Stimulus;
+use super::{World, network, watch};
+use crate::board::Board;
+use crate::bus::WireRecord;
+use crate::drive::{DriveFault, DriveStatus, PlantState};
+use crate::log::LogLine;
+use crate::time::Time;
+
+impl World<'_> {
+    /// Does something to the machine now.
+    pub fn apply(&mut self, stimulus: Stimulus) {
+        match stimulus {
+            Stimulus::Button(pressed) => self.board.set_button(pressed),
+            Stimulus::Reset(true) => {
+                self.watch.revoke();
+                self.decoder.restart();
+                self.board.hold_in_reset();
+            }
+            Stimulus::Reset(false) => self.board.release_reset(),
+            Stimulus::BlockIrq { irq, blocked } => self.board.block_irq(irq, blocked),
+            Stimulus::DelayIrq { irq, max_cycles } => {
+                self.board.delay_irq(irq, max_cycles, self.scenario.seed);
+            }
+            Stimulus::Silence { node } => self.silence(node),
+            Stimulus::Bus(fault) => self.bus.inject(fault),
+        }
+    }
+
+    /// Does something to the machine later.
+    pub fn schedule(&mut self, at: Time, stimulus: Stimulus) {
+        self.agenda.add(at, stimulus);
+    }
+
+    /// Presses the button with bouncing contacts and lets it go again. In
+    /// standby that is a release, in motion a stop.
+    pub fn press(&mut self) {
+        if self.watch.ready() {
+            self.watch.release(self.now);
+        } else {
+            self.watch.revoke();
+        }
+        let mut presses = Vec::new();
+        self.operator.press(self.now, &mut presses);
+        for (at, stimulus) in presses {
+            self.agenda.add(at, stimulus);
+        }
+    }
+
+    fn silence(&mut self, node: NodeId) {
+        let at = self.now;
+        let station = network()
+            .find(node)
+            .and_then(|(axis, _)| self.stations[axis].as_mut());
+        if let Some(station) = station {
+            station.drive.inject(DriveFault::HeartbeatLost { at });
+            station.drive.inject(DriveFault::TpdosLost { at });
+            station.drive.inject(DriveFault::SdoDead { at });
+        }
+    }
+
+    /// The present moment.
+    pub fn now(&self) -> Time {
+        self.now
+    }
+
+    /// When the scenario ends.
+    pub fn end(&self) -> Time {
+        self.scenario.end
+    }
+
+    /// All drives are enabled and at rest: a press of the button releases
+    /// motion.
+    pub fn ready(&self) -> bool {
+        self.watch.ready()
+    }
+
+    /// No axis moves.
+    pub fn at_rest(&self) -> bool {
+        self.watch.at_rest()
+    }
+
+    /// All axes turn.
+    pub fn in_full_motion(&self) -> bool {
+        self.truths()
+            .flatten()
+            .all(|truth| watch::is_full_motion(truth.velocity_rpm))
+    }
+
+    /// What is true of each axis; `None`: not on the bus.
+    pub fn truths(&self) -> impl Iterator<Item = Option<PlantState>> + '_ {
+        self.stations
+            .iter()
+            .map(|station| station.as_ref().map(|station| station.drive.truth()))
+    }
+
+    /// What each drive is in; `None`: not on the bus.
+    pub fn statuses(&self) -> impl Iterator<Item = Option<DriveStatus>> + '_ {
+        self.stations
+            .iter()
+            .map(|station| station.as_ref().map(|station| station.drive.status()))
+    }
+
+    /// Round trips that were finished, and whether one is going on.
+    pub fn round_trips(&self) -> (usize, bool) {
+        let done = self
+            .watch
+            .releases
+            .iter()
+            .filter(|release| release.done.is_some())
+            .count();
+        let going_on = self
+            .watch
+            .releases
+            .last()
+            .is_some_and(|release| release.done.is_none() && !release.revoked);
+        (done, going_on)
+    }
+
+    /// What was on the wire so far.
+    pub fn wire(&self) -> &[WireRecord] {
+        &self.wire
+    }
+
+    /// The firmware's log so far.
+    pub fn log(&self) -> &[(Time, LogLine)] {
+        &self.log
+    }
+
+    /// The emulated board.
+    pub fn board(&self) -> &Board {
+        &self.board
+    }
+}

@@ -1,0 +1,185 @@
+//! The event loop: the board runs until something else happens, then the bus,
+//! then the drives; and now and then the machine is looked at.
+
+use super::operator::View;
+use super::watch::AxisTruth;
+use super::{Observer, World, enabled, operational, round_trip};
+use crate::board::Stop;
+use crate::drive::Drive;
+use crate::log::Level;
+use crate::time::Time;
+
+/// How often the machine is looked at: truth of the plant, log, operator.
+const LOOK: Time = Time::from_us(200);
+/// The board's only CAN controller in use.
+const FDCAN1: usize = 0;
+/// After a complaint of the firmware and standstill, how long it may go on to
+/// say why.
+const LAST_WORDS: Time = Time::from_ms(200);
+
+impl World<'_> {
+    /// One step of the event loop, at most until `limit`.
+    pub(super) fn step(&mut self, limit: Time, observer: &mut dyn Observer) {
+        while let Some(stimulus) = self.agenda.due(self.now) {
+            self.apply(stimulus);
+        }
+        let until = self.next_moment().min(limit).max(self.now);
+        let reached = match self.board.run_until(until) {
+            Stop::Reached => until,
+            // What the board would send has changed: the bus has to know
+            // before it goes on.
+            Stop::CanChanged => self.board.now().clamp(self.now, until),
+            Stop::Fault(report) => {
+                self.complained.get_or_insert(self.now);
+                self.halted
+                    .get_or_insert_with(|| format!("the firmware crashed: {report}"));
+                until
+            }
+        };
+        self.now = reached;
+        self.offer_board();
+        self.advance_bus();
+        self.advance_drives();
+        if self.now >= self.next_look {
+            self.next_look = self.now + LOOK;
+            self.look(observer);
+        }
+    }
+
+    /// When something happens next that is not the board's doing.
+    fn next_moment(&self) -> Time {
+        let deadlines = self
+            .stations
+            .iter()
+            .flatten()
+            .map(|station| station.drive.next_deadline());
+        [
+            self.bus.next_event(),
+            self.agenda.next(),
+            Some(self.next_look),
+        ]
+        .into_iter()
+        .flatten()
+        .chain(deadlines)
+        .min()
+        .unwrap_or(self.next_look)
+    }
+
+    fn offer_board(&mut self) {
+        let timing = self.board.can_timing(FDCAN1);
+        if timing != self.board_timing {
+            self.board_timing = timing;
+            self.bus.set_timing(self.board_port, timing, self.now);
+        }
+        self.bus
+            .offer(self.board_port, self.board.can_offer(FDCAN1));
+    }
+
+    fn advance_bus(&mut self) {
+        let mut events = std::mem::take(&mut self.events);
+        self.bus.advance(self.now, &mut events);
+        for event in &events {
+            if event.port == self.board_port {
+                self.board.can_event(FDCAN1, event);
+            } else if let Some(station) = self
+                .stations
+                .iter_mut()
+                .flatten()
+                .find(|station| station.port == event.port)
+            {
+                station.drive.on_event(event);
+            }
+        }
+        if !events.is_empty() {
+            self.offer_board();
+        }
+        events.clear();
+        self.events = events;
+    }
+
+    fn advance_drives(&mut self) {
+        for station in self.stations.iter_mut().flatten() {
+            if station.drive.next_deadline() <= self.now {
+                station.drive.advance(self.now);
+            }
+            let timing = station.drive.timing();
+            if timing != station.timing {
+                station.timing = timing;
+                self.bus.set_timing(station.port, timing, self.now);
+            }
+            self.bus.offer(station.port, station.drive.offer());
+        }
+    }
+
+    fn look(&mut self, observer: &mut dyn Observer) {
+        self.wire.extend(self.bus.take_records());
+        self.read_log(observer);
+        for station in self.stations.iter_mut().flatten() {
+            // Control cycles that nobody waits for have not been worked out yet.
+            station.drive.advance(self.now);
+        }
+        let truth: Vec<Option<AxisTruth>> = self
+            .stations
+            .iter()
+            .map(|station| station.as_ref().map(|station| axis_truth(&station.drive)))
+            .collect();
+        if self.watch.sample(self.now, &truth) {
+            self.operator.trip_done();
+        }
+        if self.watch.full_motion() {
+            for stimulus in std::mem::take(&mut self.in_motion) {
+                self.apply(stimulus);
+            }
+        }
+        self.operate();
+        observer.look(self);
+    }
+
+    fn read_log(&mut self, observer: &mut dyn Observer) {
+        self.rtt.clear();
+        self.board.drain_rtt(&mut self.rtt);
+        self.decoder.decode(&self.rtt, &mut self.lines);
+        for line in self.lines.drain(..) {
+            observer.log(self.now, &line);
+            if line.level == Some(Level::Error) && self.complained.is_none() {
+                self.complained = Some(self.now);
+                self.watch.revoke();
+            }
+            self.log.push((self.now, line));
+        }
+    }
+
+    fn operate(&mut self) {
+        let view = View {
+            now: self.now,
+            ready: self.watch.ready(),
+            round_trip: self.watch.round_trip().or_else(round_trip),
+            end: self.scenario.end,
+        };
+        let mut presses = Vec::new();
+        if self.operator.look(view, &mut presses) {
+            self.watch.release(self.now);
+        }
+        for (at, stimulus) in presses {
+            self.agenda.add(at, stimulus);
+        }
+    }
+
+    /// Nothing more is to be expected.
+    pub(super) fn over(&self) -> bool {
+        self.complained
+            .is_some_and(|since| self.now >= since + LAST_WORDS)
+            && self.watch.at_rest()
+    }
+}
+
+fn axis_truth(drive: &Drive) -> AxisTruth {
+    let truth = drive.truth();
+    let status = drive.status();
+    AxisTruth {
+        position: truth.position_inc,
+        velocity: truth.velocity_rpm,
+        operational: operational(&status),
+        enabled: enabled(&status),
+    }
+}
