@@ -124,7 +124,8 @@ fn too_short_a_run_is_incomplete_and_nothing_moves() {
 fn without_a_release_the_machine_stands_by() {
     let record = run(Scenario::new(5, Time::from_ms(6000)).unattended());
     assert!(record.startup.enabled.is_some());
-    assert_eq!(record.verdict.outcome, Outcome::Incomplete);
+    let verdict = &record.verdict;
+    assert_eq!(verdict.outcome, Outcome::Incomplete, "{}", verdict.reason);
     assert!(
         record
             .axes

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use canmaster::NodeId;
 use canmaster_sim::log::Level;
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 
 use crate::run::fault::Fault;
 
@@ -21,6 +21,33 @@ const LONGEST_RUN_S: f64 = 3600.0;
 pub(crate) struct Cli {
     #[command(subcommand)]
     pub(crate) command: Command,
+}
+
+impl Cli {
+    /// Reads the command line. Whatever is wrong with it ends the program with
+    /// usage and exit code 2; help is printed with exit code 0.
+    pub(crate) fn parse_or_exit() -> Cli {
+        Cli::try_parse().unwrap_or_else(|error| {
+            let words = error.render();
+            if error.use_stderr() && !words.to_string().contains("Usage") {
+                // Of a bad value clap says only what is wrong with it.
+                eprintln!("{words}\n{}", usage());
+                std::process::exit(error.exit_code());
+            }
+            error.exit()
+        })
+    }
+}
+
+/// Usage of the command that was typed.
+fn usage() -> clap::builder::StyledStr {
+    let mut all = Cli::command();
+    all.build();
+    let typed = std::env::args().nth(1).unwrap_or_default();
+    match all.find_subcommand_mut(&typed) {
+        Some(command) => command.render_usage(),
+        None => all.render_usage(),
+    }
 }
 
 #[derive(Subcommand)]
@@ -177,8 +204,6 @@ pub(crate) fn results_dir() -> PathBuf {
 
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory;
-
     use super::*;
 
     #[test]

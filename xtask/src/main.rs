@@ -15,13 +15,10 @@ mod toolchain;
 
 use std::process::ExitCode;
 
-use clap::Parser;
-
 use cli::{Cli, Command};
 
 fn main() -> ExitCode {
-    // Unknown options and bad numbers end in here, with usage and exit code 2.
-    let cli = Cli::parse();
+    let cli = Cli::parse_or_exit();
     let outcome = match cli.command {
         Command::Run(options) => run::command(&options),
         Command::Test(options) => ci::test(&options),

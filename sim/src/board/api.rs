@@ -145,6 +145,18 @@ impl Board {
         self.irq.delay(irq, max_cycles, seed);
     }
 
+    /// The task of interrupt `irq` hangs: until the next reset the interrupt is
+    /// not taken any more, whether hardware or program asks for it.
+    pub fn hang_irq(&mut self, irq: u8) {
+        /// Interrupt clear-enable registers of the NVIC (ARMv7-M, B3.4.5).
+        const ICER: u32 = 0xE000_E180;
+        const BITS: u32 = 32;
+        let (word, bit) = (u32::from(irq) / BITS, u32::from(irq) % BITS);
+        self.core.with_sys(|sys| {
+            sys.write_word(ICER + word * 4, 1 << bit);
+        });
+    }
+
     /// Does not deliver interrupt `irq` from now on, or delivers it again.
     pub fn block_irq(&mut self, irq: u8, blocked: bool) {
         self.irq.block(irq, blocked);

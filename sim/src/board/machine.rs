@@ -45,7 +45,7 @@ const EXCEPTION_MASK: u32 = 0x1FF;
 /// The emulated board.
 #[derive(Debug)]
 pub struct Board {
-    core: ArmV7m,
+    pub(super) core: ArmV7m,
     pub(super) soc: Arc<Mutex<Soc>>,
     pub(super) shared: Arc<Shared>,
     pub(super) memory: Memory,

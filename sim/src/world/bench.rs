@@ -21,7 +21,7 @@ impl World<'_> {
                 self.board.hold_in_reset();
             }
             Stimulus::Reset(false) => self.board.release_reset(),
-            Stimulus::BlockIrq { irq, blocked } => self.board.block_irq(irq, blocked),
+            Stimulus::Hang { irq } => self.board.hang_irq(irq),
             Stimulus::DelayIrq { irq, max_cycles } => {
                 self.board.delay_irq(irq, max_cycles, self.scenario.seed);
             }

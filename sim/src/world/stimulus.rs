@@ -14,12 +14,10 @@ pub enum Stimulus {
     Button(bool),
     /// The reset pin is pulled low, or let go.
     Reset(bool),
-    /// An interrupt of the board is not taken any more, or is again.
-    BlockIrq {
+    /// An interrupt of the board is not taken any more, until its next reset.
+    Hang {
         /// Its number.
         irq: u8,
-        /// Whether it is held back.
-        blocked: bool,
     },
     /// An interrupt of the board is taken late.
     DelayIrq {

@@ -58,15 +58,11 @@ pub fn reset_in_motion(
 pub fn hang_in_motion(image: &Image, seed: u64, irq: u8) -> Result<(), TrialError> {
     let mut world = moving(image, seed)?;
     let resets = world.board().stats().resets.len();
-    world.apply(Stimulus::BlockIrq { irq, blocked: true });
+    world.apply(Stimulus::Hang { irq });
     let limit = world.now() + WATCHDOG_BY;
     let bitten = world.run_to(limit, |world| world.board().stats().resets.len() > resets);
     must(&world, bitten, "the watchdog has not reset the board")?;
     world.watch.revoke();
-    world.apply(Stimulus::BlockIrq {
-        irq,
-        blocked: false,
-    });
     comes_to_rest_and_waits(&mut world, Time::ZERO)
 }
 

@@ -337,6 +337,7 @@ mod tests {
         let text = cycle(&lanes, 0.0, 1000.0).unwrap();
         let widths: Vec<u32> = text
             .split("<rect ")
+            .filter_map(|part| part.split("/>").next())
             .filter(|part| part.contains("#333333"))
             .filter_map(|part| {
                 part.split("width=\"")
