@@ -26,7 +26,7 @@ mod app {
         counters::{self, Counts},
         filters::{self, Handler},
         leds,
-        log::{Log, News},
+        log::{Log, News, UPTIME_MS},
         roll::{self, Task},
         wake,
     };
@@ -44,6 +44,7 @@ mod app {
         nmt,
         time::Instant,
     };
+    use core::sync::atomic::Ordering;
     use heapless::{
         Vec,
         spsc::{Consumer, Producer, Queue},
@@ -339,7 +340,7 @@ mod app {
     /// the next SYNC puts into effect.
     ///
     /// Trigger: pended by the last expected TPDO, or TIM3 compare at the
-    /// deadline, whichever is first; once per cycle. Budget: 20 000 cycles. If it
+    /// deadline, whichever is first; once per cycle. Budget: 10 000 cycles. If it
     /// has not run before the next SYNC, that cycle is an overrun: it is counted,
     /// and the drives keep the set-points of the cycle before.
     #[task(
@@ -404,6 +405,7 @@ mod app {
         CLOCK.keep(counter);
         let now = CLOCK.now(|| counter);
         *local.milliseconds = local.milliseconds.wrapping_add(1);
+        UPTIME_MS.store(*local.milliseconds, Ordering::Relaxed);
 
         while let Some(frame) = local.from_can.dequeue() {
             if let Some((FunctionCode::ErrorControl, _)) = frame.id().split() {
@@ -469,7 +471,7 @@ mod app {
         news: &mut Producer<'static, News>,
         control: &mut impl rtic::Mutex<T = Control>,
     ) {
-        if let (Some(axis), Some(cause)) = (report.axis, report.notice.fault()) {
+        if let (Some(axis), Some(cause)) = (report.axis, report.fault) {
             control.lock(|control| control.tell_fault(axis, cause));
         }
         publish(news, News::Node(report));

@@ -5,12 +5,18 @@
 use crate::counters::Counts;
 use canmaster::{
     boot::Event,
-    master::{Notice, Report},
+    master::Report,
     motion::{FaultCause, GroupEvent, GroupState},
     network::Network,
 };
+use core::sync::atomic::{AtomicU32, Ordering};
 use defmt::{Display2Format, error, info, warn};
 use nucleo_g474re::can::ErrorState;
+
+/// Milliseconds since the start, for the log; `network` counts them.
+pub(crate) static UPTIME_MS: AtomicU32 = AtomicU32::new(0);
+
+defmt::timestamp!("{=u32:ms}", UPTIME_MS.load(Ordering::Relaxed));
 
 /// What `network` has to say.
 #[derive(Clone, Copy)]
@@ -49,7 +55,7 @@ impl Log {
     /// What `network` had to say.
     pub(crate) fn news(&mut self, news: &News) {
         match news {
-            News::Node(Report { axis, notice }) => self.notice(axis.is_some(), notice),
+            News::Node(report) => self.report(report),
             News::ErrorState(ErrorState::BusOff) => self.fault(format_args!(
                 "CAN controller bus-off: check CAN_H and CAN_L for a short or exchanged wires, the termination, and the bit rate of every node; then reset the board"
             )),
@@ -74,11 +80,19 @@ impl Log {
         }
     }
 
-    fn notice(&mut self, known: bool, notice: &Notice) {
-        if !known {
-            warn!("{}: not in the network description", Display2Format(notice));
-        } else if notice.fault().is_some() {
-            self.fault(format_args!("{notice}"));
+    fn report(&mut self, report: &Report) {
+        let Report {
+            axis,
+            notice,
+            fault,
+        } = report;
+        if axis.is_none() {
+            warn!(
+                "{}: it is not in the network description",
+                Display2Format(notice)
+            );
+        } else if fault.is_some() {
+            self.fault(format_args!("{notice}; {}", notice.advice()));
         } else {
             warn!("{}", Display2Format(notice));
         }

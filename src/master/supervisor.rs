@@ -56,8 +56,8 @@ impl Notice {
         }
     }
 
-    /// Why the group has to stop for it, if it has.
-    pub const fn fault(&self) -> Option<FaultCause> {
+    /// Why a running group has to stop for it, if it has.
+    const fn fault(&self) -> Option<FaultCause> {
         match self {
             Notice::Emcy { emcy, .. } => match emcy.code.class() {
                 Class::Reset | Class::Warning => None,
@@ -68,36 +68,42 @@ impl Notice {
             Notice::BootUp(_) | Notice::NotOperational { .. } => Some(FaultCause::LeftOperational),
         }
     }
+
+    /// What to do about it.
+    pub const fn advice(&self) -> &'static str {
+        match self {
+            Notice::Emcy { emcy, .. } => match emcy.code.class() {
+                Class::Reset => "nothing to do",
+                Class::Warning => "the drive goes on",
+                Class::Fault => "remove the cause, then reset the board",
+            },
+            Notice::HeartbeatLost(_) => "check its cable and supply, then reset the board",
+            Notice::HeartbeatBack(_) => "reset the board to use it",
+            Notice::BootUp(_) => {
+                "it was reset or lost its supply: check that, then reset the board"
+            }
+            Notice::NotOperational { .. } => {
+                "look for another master on the bus, then reset the board"
+            }
+        }
+    }
 }
 
 impl fmt::Display for Notice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "node {}: ", self.node())?;
         match self {
-            Notice::Emcy { emcy, .. } => match emcy.code.class() {
-                Class::Reset => write!(f, "emergency {}", emcy.code),
-                Class::Warning => {
-                    write!(f, "emergency {}, a warning: the drive goes on", emcy.code)
-                }
-                Class::Fault => write!(
+            Notice::Emcy { emcy, .. } => {
+                write!(
                     f,
-                    "emergency {}, error register {}; remove the cause, then reset the board",
+                    "emergency {}, error register: {}",
                     emcy.code, emcy.register
-                ),
-            },
-            Notice::HeartbeatLost(lost) => write!(
-                f,
-                "heartbeat lost, last state {}; check its cable and supply, then reset the board",
-                lost.last
-            ),
-            Notice::HeartbeatBack(_) => f.write_str("heartbeat is back; reset the board to use it"),
-            Notice::BootUp(_) => f.write_str(
-                "booted again, so it was reset or lost its supply; check that, then reset the board",
-            ),
-            Notice::NotOperational { state, .. } => write!(
-                f,
-                "went to NMT {state} by itself or by another master; reset the board to start again"
-            ),
+                )
+            }
+            Notice::HeartbeatLost(lost) => write!(f, "heartbeat lost, last state {}", lost.last),
+            Notice::HeartbeatBack(_) => f.write_str("heartbeat is back"),
+            Notice::BootUp(_) => f.write_str("booted again"),
+            Notice::NotOperational { state, .. } => write!(f, "went to NMT {state} unasked"),
         }
     }
 }
@@ -109,6 +115,10 @@ pub struct Report {
     pub axis: Option<usize>,
     /// What happened.
     pub notice: Notice,
+    /// Why the group has to stop for it. `None` if it need not, and before the
+    /// network was started: what a drive says then, as that it missed the master
+    /// while that was reset, is overcome by the start.
+    pub fault: Option<FaultCause>,
 }
 
 #[derive(Debug)]
@@ -159,8 +169,7 @@ impl<const N: usize> Supervisor<N> {
     pub fn on_frame(&mut self, frame: &Frame, now: Instant) -> Option<Report> {
         if let Some((node, emcy)) = Emcy::decode(frame) {
             let axis = self.nodes.iter().position(|w| w.consumer.node() == node);
-            let notice = Notice::Emcy { node, emcy };
-            return Some(Report { axis, notice });
+            return Some(self.report(axis, Notice::Emcy { node, emcy }));
         }
         let ErrorControl { node, state, .. } = ErrorControl::decode(frame)?;
         let armed = self.armed;
@@ -185,25 +194,28 @@ impl<const N: usize> Supervisor<N> {
             }
         };
         watched.reported = true;
-        Some(Report {
-            axis: Some(axis),
-            notice,
-        })
+        Some(self.report(Some(axis), notice))
     }
 
     /// Looks for heartbeats that stay away: to be called every millisecond,
     /// until it returns `None`.
     pub fn poll(&mut self, now: Instant) -> Option<Report> {
-        self.nodes
+        let (axis, lost) = self
+            .nodes
             .iter_mut()
             .enumerate()
-            .find_map(|(axis, watched)| {
-                let lost = watched.consumer.poll(now)?;
-                Some(Report {
-                    axis: Some(axis),
-                    notice: Notice::HeartbeatLost(lost),
-                })
-            })
+            .find_map(|(axis, watched)| Some((axis, watched.consumer.poll(now)?)))?;
+        Some(self.report(Some(axis), Notice::HeartbeatLost(lost)))
+    }
+
+    fn report(&self, axis: Option<usize>, notice: Notice) -> Report {
+        let counts = self.armed && axis.is_some();
+        let fault = if counts { notice.fault() } else { None };
+        Report {
+            axis,
+            notice,
+            fault,
+        }
     }
 }
 
@@ -308,16 +320,30 @@ mod tests {
         let mut supervisor = running();
         let emcy = Emcy::new(EmcyCode::GENERIC, ErrorRegister::GENERIC);
         let frame = emcy.frame(NodeId::constant::<99>());
-        assert_eq!(supervisor.on_frame(&frame, at(300)).unwrap().axis, None);
+        let report = supervisor.on_frame(&frame, at(300)).unwrap();
+        assert_eq!((report.axis, report.fault), (None, None));
     }
 
     #[test]
-    fn notices_say_what_to_do() {
+    fn before_the_start_nothing_is_a_fault() {
+        let mut supervisor = Supervisor::<6>::new(&SIX_EPOS4);
+        let emcy = Emcy::new(EmcyCode::HEARTBEAT, ErrorRegister::COMMUNICATION);
+        let report = supervisor.on_frame(&emcy.frame(NODE), at(0)).unwrap();
+        assert_eq!(report.fault, None);
+        supervisor.on_frame(&heartbeat(State::PreOperational), at(100));
+        let report = supervisor.poll(at(400)).unwrap();
+        assert!(matches!(report.notice, Notice::HeartbeatLost(_)));
+        assert_eq!(report.fault, None);
+    }
+
+    #[test]
+    fn notices_say_what_happened_and_what_to_do() {
         let emcy = Emcy::new(EmcyCode::FOLLOWING_ERROR, ErrorRegister::MANUFACTURER);
+        let notice = Notice::Emcy { node: NODE, emcy };
         assert_eq!(
-            Notice::Emcy { node: NODE, emcy }.to_string(),
-            "node 3: emergency 8611h (following error), error register manufacturer; \
-             remove the cause, then reset the board"
+            notice.to_string(),
+            "node 3: emergency 8611h (following error), error register: manufacturer"
         );
+        assert_eq!(notice.advice(), "remove the cause, then reset the board");
     }
 }
