@@ -38,6 +38,7 @@ pub mod objects;
 pub mod od;
 pub mod pdo;
 pub mod sdo;
+pub mod store;
 pub mod sync;
 pub mod time;
 

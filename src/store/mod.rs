@@ -1,0 +1,330 @@
+//! Settings that survive a power cut: a log in two pages of flash.
+//!
+//! A save appends a record behind the newest one, and goes on in the other page,
+//! erased first, where there is no room. A record is written header first and
+//! checksum last, and no page that holds the newest record is ever erased, so
+//! that a power cut at any word or in any erase leaves the old set or the new
+//! one. Flash words that a cut left half written are neither trusted nor written
+//! again: they may be unreadable (ECC), and each word can be programmed only
+//! once after an erase.
+
+mod crc32;
+
+use crate::sdo::AbortCode;
+use crc32::Crc32;
+use embedded_storage::nor_flash::{NorFlash, NorFlashError, NorFlashErrorKind};
+
+/// The unit in which records are read and written: a flash word of the STM32G4
+/// and a multiple of what most other flashes have.
+const WORD: usize = 8;
+/// The flash taken by one record.
+const RECORD: usize = 512;
+/// What a record carries at most: all but header and checksum.
+pub const CAPACITY: usize = RECORD - 2 * WORD;
+/// Marks a record, together with the version of its layout.
+const MAGIC: u16 = 0xC301;
+/// The bytes of erased flash.
+const ERASED: u8 = 0xFF;
+/// Room for the header, whose sequence number starts here.
+const SEQUENCE_AT: usize = 4;
+
+type Word = [u8; WORD];
+
+/// Why a set of settings was not stored or read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum StoreError {
+    /// The flash refused the access.
+    Flash,
+    /// The two pages are not two pages of this flash.
+    Pages,
+    /// More than [`CAPACITY`] bytes.
+    TooLong {
+        /// How many.
+        len: usize,
+    },
+    /// What was written does not read back: the pages are worn out.
+    Worn,
+    /// The buffer is too short for the set that is stored.
+    Buffer {
+        /// How many bytes it takes.
+        len: usize,
+    },
+}
+
+impl core::fmt::Display for StoreError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            StoreError::Flash => {
+                f.write_str("the flash refused the access; check its protection bits")
+            }
+            StoreError::Pages => f.write_str("the settings need two different pages of the flash"),
+            StoreError::TooLong { len } => {
+                write!(f, "{len} bytes of settings, at most {CAPACITY} fit")
+            }
+            StoreError::Worn => {
+                f.write_str("the flash does not keep what is written; replace the board")
+            }
+            StoreError::Buffer { len } => write!(f, "the settings need a buffer of {len} bytes"),
+        }
+    }
+}
+
+impl core::error::Error for StoreError {}
+
+/// What a client of 1010h is told.
+impl From<StoreError> for AbortCode {
+    fn from(error: StoreError) -> AbortCode {
+        match error {
+            StoreError::Flash | StoreError::Worn => AbortCode::HARDWARE,
+            StoreError::TooLong { .. } => AbortCode::OUT_OF_MEMORY,
+            StoreError::Pages | StoreError::Buffer { .. } => AbortCode::CANNOT_STORE,
+        }
+    }
+}
+
+/// A record that was found good.
+#[derive(Clone, Copy, Debug)]
+struct Newest {
+    page: usize,
+    slot: u32,
+    sequence: u32,
+    len: usize,
+}
+
+/// Stores one set of bytes, the newest, in two pages of a flash.
+#[derive(Debug)]
+pub struct Store<F> {
+    flash: F,
+    /// Where the two pages begin.
+    pages: [u32; 2],
+    newest: Option<Newest>,
+}
+
+impl<F: NorFlash> Store<F> {
+    const SLOTS: u32 = (F::ERASE_SIZE / RECORD) as u32;
+    const FITS: () = assert!(
+        WORD.is_multiple_of(F::WRITE_SIZE)
+            && WORD.is_multiple_of(F::READ_SIZE)
+            && F::ERASE_SIZE >= RECORD,
+        "the flash has words that are too long or pages that are too short"
+    );
+
+    /// Looks for the newest good record in the pages that begin at `pages`.
+    ///
+    /// # Errors
+    /// [`StoreError::Pages`] unless they are two different pages of the flash.
+    pub fn new(flash: F, pages: [u32; 2]) -> Result<Store<F>, StoreError> {
+        const { Self::FITS }
+        let size = F::ERASE_SIZE as u32;
+        let capacity = u32::try_from(flash.capacity()).unwrap_or(u32::MAX);
+        let fits = |at: u32| at.is_multiple_of(size) && capacity.saturating_sub(size) >= at;
+        let [a, b] = pages;
+        if a == b || !fits(a) || !fits(b) {
+            return Err(StoreError::Pages);
+        }
+        let mut store = Store {
+            flash,
+            pages,
+            newest: None,
+        };
+        for page in 0..pages.len() {
+            for slot in 0..Self::SLOTS {
+                let found = store.check(page, slot);
+                let newer = |found: &Newest| {
+                    store
+                        .newest
+                        .is_none_or(|newest| found.sequence >= newest.sequence)
+                };
+                if found.as_ref().is_some_and(newer) {
+                    store.newest = found;
+                }
+            }
+        }
+        Ok(store)
+    }
+
+    /// The set stored last, or `None` if there is none yet.
+    ///
+    /// # Errors
+    /// [`StoreError::Buffer`] if `buf` is too short, [`StoreError::Flash`] if it
+    /// cannot be read any more.
+    pub fn load<'b>(&mut self, buf: &'b mut [u8]) -> Result<Option<&'b [u8]>, StoreError> {
+        let Some(newest) = self.newest else {
+            return Ok(None);
+        };
+        let len = newest.len;
+        let into = buf.get_mut(..len).ok_or(StoreError::Buffer { len })?;
+        let at = self.address(newest.page, newest.slot);
+        for (n, part) in into.chunks_mut(WORD).enumerate() {
+            let word = self.read(at + ((n + 1) * WORD) as u32);
+            let word = word.ok_or(StoreError::Flash)?;
+            for (to, from) in part.iter_mut().zip(word) {
+                *to = from;
+            }
+        }
+        Ok(Some(into))
+    }
+
+    /// Stores a set: afterwards it, and until then the old one, is what
+    /// [`load`](Self::load) yields, whenever the power goes.
+    ///
+    /// Takes a few milliseconds, or some 25 ms where a page has to be erased.
+    ///
+    /// # Errors
+    /// [`StoreError::TooLong`], [`StoreError::Worn`], [`StoreError::Flash`]; the
+    /// old set is still stored.
+    pub fn save(&mut self, data: &[u8]) -> Result<(), StoreError> {
+        let len = data.len();
+        if len > CAPACITY {
+            return Err(StoreError::TooLong { len });
+        }
+        let sequence = self
+            .newest
+            .map_or(1, |newest| newest.sequence.wrapping_add(1));
+        if let Some(Newest { page, slot, .. }) = self.newest
+            && self.append(page, slot + 1, sequence, data).is_ok()
+        {
+            return Ok(());
+        }
+        // The other page: the one that holds the newest record stays.
+        let other = self.newest.map_or(0, |newest| 1 - newest.page);
+        let first = self.refill(other, sequence, data);
+        match (first, self.newest) {
+            (Err(_), None) => self.refill(1 - other, sequence, data),
+            (result, _) => result,
+        }
+    }
+
+    /// The flash, given back.
+    pub fn release(self) -> F {
+        self.flash
+    }
+
+    fn refill(&mut self, page: usize, sequence: u32, data: &[u8]) -> Result<(), StoreError> {
+        let at = self.address(page, 0);
+        let end = at + F::ERASE_SIZE as u32;
+        self.flash.erase(at, end).map_err(flash_error)?;
+        self.append(page, 0, sequence, data)
+    }
+
+    /// Writes the record into the first blank place from `slot` on that keeps it.
+    fn append(
+        &mut self,
+        page: usize,
+        slot: u32,
+        sequence: u32,
+        data: &[u8],
+    ) -> Result<(), StoreError> {
+        let mut result = Err(StoreError::Worn);
+        for slot in slot..Self::SLOTS {
+            if !self.is_blank(page, slot) {
+                continue;
+            }
+            result = self.write(self.address(page, slot), sequence, data);
+            if result.is_ok() {
+                let written = self.check(page, slot);
+                match written {
+                    Some(new) if new.sequence == sequence && new.len == data.len() => {
+                        self.newest = written;
+                        return Ok(());
+                    }
+                    _ => result = Err(StoreError::Worn),
+                }
+            }
+        }
+        result
+    }
+
+    fn write(&mut self, at: u32, sequence: u32, data: &[u8]) -> Result<(), StoreError> {
+        let mut crc = Crc32::new();
+        let mut at = at;
+        let mut put = |word: Word| {
+            crc.update(&word);
+            let here = at;
+            at += WORD as u32;
+            self.flash.write(here, &word).map_err(flash_error)
+        };
+        put(header(data.len(), sequence))?;
+        for part in data.chunks(WORD) {
+            let mut word = [ERASED; WORD];
+            for (to, from) in word.iter_mut().zip(part) {
+                *to = *from;
+            }
+            put(word)?;
+        }
+        self.flash
+            .write(at, &trailer(crc.value()))
+            .map_err(flash_error)
+    }
+
+    /// The record in this place, if it is whole.
+    fn check(&mut self, page: usize, slot: u32) -> Option<Newest> {
+        let at = self.address(page, slot);
+        let first = self.read(at)?;
+        let [m0, m1, l0, l1, rest @ ..] = first;
+        let len = usize::from(u16::from_le_bytes([l0, l1]));
+        if u16::from_le_bytes([m0, m1]) != MAGIC || len > CAPACITY {
+            return None;
+        }
+        let mut crc = Crc32::new();
+        crc.update(&first);
+        let words = len.div_ceil(WORD);
+        for n in 1..=words {
+            crc.update(&self.read(at + (n * WORD) as u32)?);
+        }
+        let last = self.read(at + ((words + 1) * WORD) as u32)?;
+        (last == trailer(crc.value())).then_some(Newest {
+            page,
+            slot,
+            sequence: u32::from_le_bytes(rest),
+            len,
+        })
+    }
+
+    fn is_blank(&mut self, page: usize, slot: u32) -> bool {
+        let at = self.address(page, slot);
+        (0..RECORD / WORD).all(|n| self.read(at + (n * WORD) as u32) == Some([ERASED; WORD]))
+    }
+
+    /// A word; `None` if it cannot be read, as one that a power cut tore.
+    fn read(&mut self, at: u32) -> Option<Word> {
+        let mut word = [0; WORD];
+        self.flash.read(at, &mut word).ok()?;
+        Some(word)
+    }
+
+    fn address(&self, page: usize, slot: u32) -> u32 {
+        let page = self.pages.get(page).copied().unwrap_or_default();
+        page + slot * RECORD as u32
+    }
+}
+
+fn header(len: usize, sequence: u32) -> Word {
+    let [m0, m1] = MAGIC.to_le_bytes();
+    let [l0, l1] = (len as u16).to_le_bytes();
+    let mut word = [m0, m1, l0, l1, 0, 0, 0, 0];
+    for (to, from) in word
+        .iter_mut()
+        .skip(SEQUENCE_AT)
+        .zip(sequence.to_le_bytes())
+    {
+        *to = from;
+    }
+    word
+}
+
+/// The checksum and its complement: neither erased nor cleared flash looks like
+/// this.
+fn trailer(crc: u32) -> Word {
+    let both = u64::from(!crc) << u32::BITS | u64::from(crc);
+    both.to_le_bytes()
+}
+
+fn flash_error<E: NorFlashError>(error: E) -> StoreError {
+    match error.kind() {
+        NorFlashErrorKind::OutOfBounds | NorFlashErrorKind::NotAligned => StoreError::Pages,
+        _ => StoreError::Flash,
+    }
+}
