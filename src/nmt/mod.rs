@@ -2,14 +2,18 @@
 
 mod command;
 mod consumer;
+mod error_behaviour;
 mod error_control;
+mod guarding;
 mod node;
 mod producer;
 mod state;
 
 pub use command::{Command, NodeControl, Target};
 pub use consumer::{Consumer, Heard, Lost};
+pub use error_behaviour::ErrorBehaviour;
 pub use error_control::ErrorControl;
+pub use guarding::{Guard, Guarded, Guardian, LifeGuarding};
 pub use node::{Node, NodeEvent};
 pub use producer::Producer;
 pub use state::{Service, State};

@@ -1,6 +1,7 @@
 //! Tests of NMT, EMCY, SYNC, the LSS, the indicators and PDOs.
 
 mod emcy;
+mod guarding;
 mod led;
 mod lss;
 mod nmt;
