@@ -84,6 +84,20 @@ impl CobId {
         CobId(function.base() | node.get() as u16)
     }
 
+    /// Whether no object with a configurable identifier may use this one: PDO,
+    /// SYNC, TIME, EMCY, further SDOs (CiA 301, 7.3.5, table 40).
+    pub const fn is_restricted(self) -> bool {
+        matches!(
+            self.0,
+            0x000..=0x07F
+                | 0x101..=0x180
+                | 0x581..=0x5FF
+                | 0x601..=0x67F
+                | 0x6E0..=0x6FF
+                | 0x701..=0x7FF
+        )
+    }
+
     /// The 11-bit number.
     pub const fn get(self) -> u16 {
         self.0

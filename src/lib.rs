@@ -41,6 +41,7 @@ pub mod sdo;
 pub mod store;
 pub mod sync;
 pub mod time;
+pub mod time_of_day;
 
 pub use frame::Frame;
 pub use id::{CobId, Index, NodeId, SubIndex};

@@ -1,9 +1,15 @@
 //! Emergency messages (CiA 301, 7.2.7).
 
+mod cob_id;
 mod code;
+mod history;
+mod producer;
 mod register;
 
+pub use cob_id::EmcyCobId;
 pub use code::{Class, EmcyCode};
+pub use history::History;
+pub use producer::{ERROR_FIELD, Producer};
 pub use register::ErrorRegister;
 
 use crate::frame::{Frame, MAX_DATA};

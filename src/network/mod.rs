@@ -4,6 +4,7 @@
 mod plan;
 pub mod sample;
 
+pub(crate) use plan::cob_id;
 pub use plan::{ConfigWrite, plan, planned};
 
 use crate::id::NodeId;

@@ -175,7 +175,7 @@ impl PdoSteps {
 }
 
 /// The identifier of the predefined connection set (CiA 301, 7.3.5).
-const fn cob_id(node: NodeId, direction: Direction, number: u8) -> PdoCobId {
+pub(crate) const fn cob_id(node: NodeId, direction: Direction, number: u8) -> PdoCobId {
     let function = match (direction, number) {
         (Direction::Receive, 1) => FunctionCode::Rpdo1,
         (Direction::Receive, 2) => FunctionCode::Rpdo2,

@@ -60,25 +60,9 @@ impl PdoCobId {
         let id = self.id().ok_or(AbortCode::VALUE_RANGE)?;
         let reserved = self.0 & !(PdoCobId::INVALID | PdoCobId::NO_RTR | PdoCobId::ID_MASK);
         let moved = self.is_valid() && old.is_valid() && Some(id) != old.id();
-        if reserved != 0 || moved || (self.is_valid() && is_restricted(id)) {
+        if reserved != 0 || moved || (self.is_valid() && id.is_restricted()) {
             return Err(AbortCode::VALUE_RANGE);
         }
         Ok(())
     }
-}
-
-/// Identifiers that no PDO may use (CiA 301, 7.3.5, table 40).
-const RESTRICTED: [(u16, u16); 6] = [
-    (0x000, 0x07F),
-    (0x101, 0x180),
-    (0x581, 0x5FF),
-    (0x601, 0x67F),
-    (0x6E0, 0x6FF),
-    (0x701, 0x7FF),
-];
-
-fn is_restricted(id: CobId) -> bool {
-    RESTRICTED
-        .iter()
-        .any(|&(first, last)| (first..=last).contains(&id.get()))
 }

@@ -1,6 +1,10 @@
 //! SYNC: its COB-ID, counter and frame (CiA 301, 7.2.5, 7.5.2.5 .. 7.5.2.7,
 //! 7.5.2.22).
 
+mod parameters;
+
+pub use parameters::SyncParameters;
+
 use crate::frame::Frame;
 use crate::id::CobId;
 use crate::sdo::AbortCode;

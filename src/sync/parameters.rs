@@ -1,0 +1,115 @@
+//! The parameters of the SYNC as the object dictionary has them: 1005h, 1006h,
+//! 1007h, 1019h (CiA 301, 7.5.2.5 .. 7.5.2.7, 7.5.2.22).
+
+use super::{SyncCobId, SyncCounter};
+use crate::sdo::AbortCode;
+
+/// COB-ID, period, window and counter of the SYNC.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct SyncParameters {
+    cob_id: SyncCobId,
+    period: u32,
+    window: u32,
+    overflow: u8,
+}
+
+impl SyncParameters {
+    /// SYNC on the predefined identifier every `period` microseconds, not yet
+    /// produced, without counter or window.
+    pub const fn new(period: u32) -> SyncParameters {
+        SyncParameters {
+            cob_id: SyncCobId::DEFAULT,
+            period,
+            window: 0,
+            overflow: 0,
+        }
+    }
+
+    /// 1005h.
+    pub const fn cob_id(&self) -> SyncCobId {
+        self.cob_id
+    }
+
+    /// 1006h, microseconds; 0: no SYNC.
+    pub const fn period(&self) -> u32 {
+        self.period
+    }
+
+    /// 1007h, microseconds after the SYNC; 0: no window.
+    pub const fn window(&self) -> u32 {
+        self.window
+    }
+
+    /// 1019h.
+    pub const fn overflow(&self) -> u8 {
+        self.overflow
+    }
+
+    /// Whether SYNCs are to be sent: bit 30 of 1005h is set and 1006h is not 0.
+    pub const fn is_producing(&self) -> bool {
+        self.cob_id.is_producer() && self.period != 0
+    }
+
+    /// A counter that begins with 1.
+    pub const fn counter(&self) -> SyncCounter {
+        match SyncCounter::new(self.overflow, 0) {
+            Ok(counter) => counter,
+            Err(_) => SyncCounter::NONE,
+        }
+    }
+
+    /// Writes 1005h: bit 30 switches the producer. The identifier is the
+    /// predefined one, for that is what the nodes of the network listen to.
+    ///
+    /// # Errors
+    /// 06090030h for another identifier or a reserved bit.
+    pub fn set_cob_id(&mut self, cob_id: SyncCobId) -> Result<(), AbortCode> {
+        if cob_id.producer(false) != SyncCobId::DEFAULT {
+            return Err(AbortCode::VALUE_RANGE);
+        }
+        self.cob_id = cob_id;
+        Ok(())
+    }
+
+    /// Writes 1006h; `shortest` is what the device can do.
+    ///
+    /// # Errors
+    /// 06090032h for a period that is shorter but not 0; 06040043h for one that
+    /// ends before the window does.
+    pub fn set_period(&mut self, period: u32, shortest: u32) -> Result<(), AbortCode> {
+        if period == 0 {
+            self.period = 0;
+            return Ok(());
+        }
+        if period < shortest {
+            return Err(AbortCode::VALUE_TOO_LOW);
+        }
+        if self.window > period {
+            return Err(AbortCode::PARAMETER_INCOMPATIBLE);
+        }
+        self.period = period;
+        Ok(())
+    }
+
+    /// Writes 1007h.
+    ///
+    /// # Errors
+    /// 06090031h for a window longer than the period.
+    pub fn set_window(&mut self, window: u32) -> Result<(), AbortCode> {
+        if self.period != 0 && window > self.period {
+            return Err(AbortCode::VALUE_TOO_HIGH);
+        }
+        self.window = window;
+        Ok(())
+    }
+
+    /// Writes 1019h.
+    ///
+    /// # Errors
+    /// 08000022h while 1006h is not 0; 06090030h for 1 and 241..=255.
+    pub fn set_overflow(&mut self, overflow: u8) -> Result<(), AbortCode> {
+        self.overflow = SyncCounter::new(overflow, self.period)?.overflow();
+        Ok(())
+    }
+}
