@@ -25,6 +25,7 @@ extern crate std;
 pub mod boot;
 pub mod cia402;
 pub mod design;
+pub mod device;
 pub mod emcy;
 pub mod frame;
 pub mod id;

@@ -1,6 +1,7 @@
 //! The settings in flash: whatever is cut wherever, the old set or the new one
 //! is there.
 
+mod device;
 mod flash;
 
 use canmaster::sdo::AbortCode;

@@ -1,0 +1,333 @@
+//! The master as a CANopen device: its own object dictionary, as any tool sees
+//! it through the SDO server, and its own emergencies.
+//!
+//! | objects | what | access |
+//! | --- | --- | --- |
+//! | 1000h .. 1003h | device type, error register, status register, error field | ro; 1003h:00 takes 0 |
+//! | 1005h, 1006h, 1007h, 1019h | SYNC | rw in pre-operational, else 08000022h |
+//! | 1008h .. 100Ah, 1018h | names, versions, identity | const |
+//! | 1010h, 1011h | "save", "load"; 08000022h while an axis is enabled | rw |
+//! | 1012h | TIME | rw |
+//! | 1014h .. 1017h | emergencies, heartbeats | rw |
+//! | 1020h, 1029h | verify configuration, error behaviour | rw |
+//! | 1028h, 1200h, 1280h .. | emergency consumer, SDO server and clients | const |
+//! | 1400h .. 1A00h .. | the mirror of the nodes' PDOs | const |
+//! | 1F22h | concise DCF of each node, as it is written to it | const |
+//! | 1F25h | "conf": configure a node again | wo |
+//! | 1F26h, 1F27h, 1F84h .. 1F88h, 1F8Ah | what each node has to be | const |
+//! | 1F80h, 1F81h, 1F89h | NMT start-up, slave assignment, boot time | rw |
+//! | 1F82h | request NMT; reads what the node last said | rw |
+//! | 2F00h:n | error status of the boot-up of node n: a letter of CiA 302-2, 0 for none | ro, U8 |
+//! | 2F01h:n | boot-up of node n in words | ro, string |
+//! | 2F02h:n | newest emergency of node n in words | ro, string |
+//! | 2F10h | the master's clock; 08000024h before it is set | rw, TIME_OF_DAY |
+//! | 2F11h | period of TIME in milliseconds, 0 = off | rw, U16 |
+//! | 2F80h + n | emergencies of node n: count (0 clears), then the eight bytes of each, newest first | U64 |
+//! | 3000h + n | process data of node n: what it sends, then what it receives, as mapped | ro |
+//!
+//! What follows from the design of the network is constant: writing it is
+//! answered with 06010002h. It is computed from [`Network`], not stored.
+
+mod communication;
+mod dictionary;
+mod error;
+mod found;
+mod index;
+mod manager;
+mod node_record;
+mod pdo;
+mod settings;
+mod window;
+
+pub use error::MasterError;
+pub use node_record::NodeStatus;
+pub use settings::{Assignment, Setting, Settings, Startup};
+
+use crate::boot;
+use crate::emcy::{self, Emcy};
+use crate::frame::{Frame, MAX_DATA};
+use crate::id::NodeId;
+use crate::network::Network;
+use crate::nmt::{NodeControl, Service, State, Target};
+use crate::sdo::{AbortCode, Server};
+use crate::time::{Duration, Instant};
+use crate::time_of_day::{self, TimeOfDay};
+use dictionary::{Dictionary, View};
+use node_record::Presence;
+
+/// What the board is called.
+#[derive(Clone, Copy, Debug)]
+pub struct Description {
+    /// 1000h: 0 for a device without profile.
+    pub device_type: u32,
+    /// 1008h
+    pub name: &'static str,
+    /// 1009h
+    pub hardware: &'static str,
+    /// 100Ah
+    pub software: &'static str,
+    /// 1018h
+    pub identity: Identity,
+    /// The shortest SYNC period that the device can keep, in microseconds.
+    pub shortest_cycle_us: u32,
+}
+
+/// The identity object, 1018h (CiA 301, 7.5.2.21).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Identity {
+    /// Vendor-ID as CiA assigns it; 0 where none was.
+    pub vendor: u32,
+    /// Product code.
+    pub product: u32,
+    /// Revision number, major in the high word.
+    pub revision: u32,
+    /// Serial number.
+    pub serial: u32,
+}
+
+/// What the dictionary needs of the rest of the device.
+pub trait Board {
+    /// Stores the settings, so that they survive power-off; an empty set means
+    /// the design's own. Called while no axis is enabled.
+    ///
+    /// # Errors
+    /// 06060000h if it failed, 08000022h if it is not possible on this board.
+    fn save(&mut self, settings: &[u8]) -> Result<(), AbortCode>;
+
+    /// The bytes of a TPDO of a node as it last came, zeros before.
+    fn tpdo(&mut self, node: NodeId, number: u8) -> [u8; MAX_DATA];
+
+    /// The bytes of an RPDO of a node as it was last sent, zeros before.
+    fn rpdo(&mut self, node: NodeId, number: u8) -> [u8; MAX_DATA];
+}
+
+/// What a client caused, for the caller to carry out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Event {
+    /// A setting has changed: what uses it has to take it over from
+    /// [`Device::settings`].
+    Changed(Setting),
+    /// 1F82h: this command is to be sent, and obeyed where it is meant for the
+    /// master itself.
+    Nmt(NodeControl),
+    /// 1F25h: these nodes are to be configured again.
+    Configure(Target),
+}
+
+/// The node side of a master of at most `N` nodes: SDO server, object
+/// dictionary, emergencies, TIME. Heartbeat and NMT state machine are
+/// [`nmt::Producer`](crate::nmt::Producer) and [`nmt::Node`](crate::nmt::Node).
+#[derive(Debug)]
+pub struct Device<const N: usize> {
+    server: Server,
+    dictionary: Dictionary<N>,
+    time: time_of_day::Producer,
+}
+
+impl<const N: usize> Device<N> {
+    /// The device with the settings of the network's design. An SDO transfer
+    /// that stands still for `timeout` is aborted.
+    pub fn new(
+        description: Description,
+        network: &'static Network,
+        timeout: Duration,
+    ) -> Device<N> {
+        Device {
+            server: Server::new(network.master.node, timeout),
+            dictionary: Dictionary {
+                description,
+                network,
+                settings: Settings::new(network),
+                errors: emcy::Producer::new(),
+                state: State::Initialising,
+                status: 0,
+                axes_enabled: false,
+                clock: time_of_day::Clock::new(),
+                nodes: core::array::from_fn(|_| Default::default()),
+                events: heapless::Deque::new(),
+            },
+            time: time_of_day::Producer::new(),
+        }
+    }
+
+    /// Takes over the settings that were saved, after power-on and on NMT reset
+    /// communication; `&[]` for the design's own. What this version does not
+    /// know or accept keeps the design's value.
+    pub fn load(&mut self, saved: &[u8], now: Instant) {
+        let dictionary = &mut self.dictionary;
+        let shortest = dictionary.description.shortest_cycle_us;
+        let producing = dictionary.settings.sync().cob_id().is_producer();
+        dictionary.settings = Settings::decode(dictionary.network, saved, shortest);
+        dictionary.settings.set_sync_producer(producing);
+        self.start_time(now);
+    }
+
+    /// The settings in force.
+    pub const fn settings(&self) -> &Settings<N> {
+        &self.dictionary.settings
+    }
+
+    /// The NMT state of the device. A transfer ends where SDO is no longer
+    /// allowed.
+    pub fn set_state(&mut self, state: State, board: &mut impl Board, now: Instant) {
+        self.dictionary.state = state;
+        if !state.allows(Service::Sdo) {
+            let view = &mut View {
+                dictionary: &mut self.dictionary,
+                board,
+                now,
+            };
+            self.server.reset(view);
+        }
+    }
+
+    /// Bit 30 of 1005h, where the device itself switches the SYNC.
+    pub fn set_sync_producer(&mut self, on: bool) {
+        self.dictionary.settings.set_sync_producer(on);
+    }
+
+    /// 1002h, the manufacturer status register.
+    pub fn set_status(&mut self, status: u32) {
+        self.dictionary.status = status;
+    }
+
+    /// While an axis is enabled nothing is saved.
+    pub fn set_axes_enabled(&mut self, enabled: bool) {
+        self.dictionary.axes_enabled = enabled;
+    }
+
+    /// Takes note of a step of the boot-up: 2F00h, 2F01h.
+    pub fn on_boot_event(&mut self, event: &boot::Event) {
+        self.dictionary.on_boot_event(event);
+    }
+
+    /// Takes note of an emergency of a node: 2F02h, 2F80h.
+    pub fn on_emcy(&mut self, node: NodeId, emcy: Emcy) {
+        if let Some(record) = self.dictionary.record(node) {
+            record.emcy.push(emcy);
+        }
+    }
+
+    /// Takes note of what error control tells of a node: 1F82h. `None`: it was
+    /// lost.
+    pub fn on_node_state(&mut self, node: NodeId, state: Option<State>) {
+        if let Some(record) = self.dictionary.record(node) {
+            record.presence = state.map_or(Presence::Missing, Presence::State);
+        }
+    }
+
+    /// An error of the master has come: 1001h, 1003h, and an emergency.
+    pub fn raise(&mut self, error: MasterError) {
+        self.dictionary.errors.raise(error.emcy());
+    }
+
+    /// An error of the master has gone; it is told with the same facts as when
+    /// it came.
+    pub fn clear(&mut self, error: MasterError) {
+        self.dictionary.errors.clear(error.emcy());
+    }
+
+    /// What a client caused: to be called until it returns `None`, after every
+    /// frame.
+    pub fn take_event(&mut self) -> Option<Event> {
+        self.dictionary.events.pop_front()
+    }
+
+    /// Takes in a frame: a request to the SDO server, answered unless the NMT
+    /// state forbids it, or TIME.
+    pub fn on_frame(
+        &mut self,
+        frame: &Frame,
+        now: Instant,
+        board: &mut impl Board,
+    ) -> Option<Frame> {
+        let state = self.dictionary.state;
+        if state.allows(Service::Time) {
+            self.on_time(frame, now);
+        }
+        if !state.allows(Service::Sdo) {
+            return None;
+        }
+        let before = self.time_parameters();
+        let view = &mut View {
+            dictionary: &mut self.dictionary,
+            board,
+            now,
+        };
+        let answer = self.server.on_frame(frame, now, view);
+        if self.time_parameters() != before {
+            self.start_time(now);
+        }
+        answer
+    }
+
+    /// Lets time pass: to be called until it returns `None`, or until there is
+    /// no room for another frame.
+    pub fn poll(&mut self, now: Instant, board: &mut impl Board) -> Option<Frame> {
+        let dictionary = &mut self.dictionary;
+        let settings = &dictionary.settings;
+        let emcy = dictionary.errors.poll(
+            now,
+            dictionary.state,
+            settings.emcy_cob_id(),
+            settings.emcy_inhibit(),
+        );
+        if emcy.is_some() {
+            return emcy;
+        }
+        if let Some(id) = settings.time_cob_id().id()
+            && dictionary.state.allows(Service::Time)
+            && let Some(time) = self.time.poll(now, &dictionary.clock, id)
+        {
+            return Some(time);
+        }
+        let view = &mut View {
+            dictionary,
+            board,
+            now,
+        };
+        self.server.poll(now, view)
+    }
+
+    /// When [`poll`](Self::poll) has something to do, if the NMT state allows
+    /// it.
+    pub fn next_deadline(&self) -> Option<Instant> {
+        let state = self.dictionary.state;
+        let errors = self.dictionary.errors.next_deadline();
+        let time = self.time.next_deadline();
+        [
+            errors.filter(|_| state.allows(Service::Emergency)),
+            time.filter(|_| state.allows(Service::Time)),
+            self.server.next_deadline(),
+        ]
+        .into_iter()
+        .flatten()
+        .min()
+    }
+
+    /// Whether TIME is produced, and how often.
+    fn time_parameters(&self) -> (bool, Duration) {
+        let settings = &self.dictionary.settings;
+        (settings.time_cob_id().is_producer(), settings.time_period())
+    }
+
+    fn start_time(&mut self, now: Instant) {
+        let period = match self.time_parameters() {
+            (true, period) => period,
+            (false, _) => Duration::ZERO,
+        };
+        self.time.set_period(period, now);
+    }
+
+    fn on_time(&mut self, frame: &Frame, now: Instant) {
+        let cob_id = self.dictionary.settings.time_cob_id();
+        if let Some(id) = cob_id.id()
+            && cob_id.is_consumer()
+            && let Some(time) = TimeOfDay::from_frame(frame, id)
+        {
+            self.dictionary.clock.set(time, now);
+        }
+    }
+}

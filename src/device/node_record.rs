@@ -1,0 +1,111 @@
+//! What the master knows of a node: boot-up, NMT state, emergencies.
+
+use crate::boot::{Event, Failure};
+use crate::emcy::{Emcy, History};
+use crate::nmt::State;
+use core::fmt;
+
+/// Emergencies kept per node.
+pub(super) const HISTORY: usize = 4;
+
+/// How far the boot-up of a node is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum NodeStatus {
+    /// The network has not been started yet.
+    #[default]
+    Idle,
+    /// Its boot-up frame is awaited.
+    Awaited,
+    /// It is asked what it is.
+    Identifying,
+    /// Its configuration is being written.
+    Configuring {
+        /// Writes done.
+        done: u16,
+        /// Writes in all; 0 before the first.
+        total: u16,
+    },
+    /// Its heartbeat is awaited.
+    Configured,
+    /// It may be started.
+    Ready,
+    /// It was started.
+    Operational,
+    /// It was given up.
+    Failed(Failure),
+}
+
+impl NodeStatus {
+    /// The status after a step of the boot-up that concerns this node.
+    pub(super) const fn after(event: &Event) -> Option<NodeStatus> {
+        Some(match *event {
+            Event::ResetSent => NodeStatus::Awaited,
+            Event::BootUp(_) => NodeStatus::Identifying,
+            Event::Identified(_) => NodeStatus::Configuring { done: 0, total: 0 },
+            Event::Configuring { done, total, .. } => NodeStatus::Configuring { done, total },
+            Event::Configured(_) => NodeStatus::Configured,
+            Event::Ready(_) => NodeStatus::Ready,
+            Event::Operational(_) => NodeStatus::Operational,
+            Event::Failed(_, failure) => NodeStatus::Failed(failure),
+            _ => return None,
+        })
+    }
+
+    /// The error status of CiA 302-2 as an ASCII letter; 0 for none.
+    pub const fn letter(&self) -> u8 {
+        match self {
+            NodeStatus::Failed(failure) => failure.status.letter() as u8,
+            _ => 0,
+        }
+    }
+}
+
+impl fmt::Display for NodeStatus {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            NodeStatus::Idle => f.write_str("not started yet"),
+            NodeStatus::Awaited => f.write_str("boot-up frame awaited"),
+            NodeStatus::Identifying => f.write_str("identity is checked"),
+            NodeStatus::Configuring { done, total: 0 } => write!(f, "configuring, {done} writes"),
+            NodeStatus::Configuring { done, total } => {
+                write!(f, "configuring, {done} of {total} writes")
+            }
+            NodeStatus::Configured => f.write_str("configured, heartbeat awaited"),
+            NodeStatus::Ready => f.write_str("ready to be started"),
+            NodeStatus::Operational => f.write_str("operational"),
+            NodeStatus::Failed(failure) => write!(f, "{failure}"),
+        }
+    }
+}
+
+/// What is known of one node.
+#[derive(Clone, Debug, Default)]
+pub(super) struct NodeRecord {
+    pub(super) status: NodeStatus,
+    pub(super) presence: Presence,
+    pub(super) emcy: History<Emcy, HISTORY>,
+}
+
+/// Whether error control hears the node.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Presence {
+    /// It was never heard.
+    #[default]
+    Unknown,
+    /// It was heard and is not any more.
+    Missing,
+    /// What it last said.
+    State(State),
+}
+
+impl Presence {
+    /// As 1F82h has it (CiA 302-2).
+    pub(super) const fn code(self) -> u8 {
+        match self {
+            Presence::Unknown => 0,
+            Presence::Missing => 1,
+            Presence::State(state) => state.code(),
+        }
+    }
+}

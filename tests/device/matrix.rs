@@ -1,0 +1,246 @@
+//! Every object of the dictionary: its type, its access, and in which NMT state
+//! it answers what.
+
+use crate::rig::Bench;
+use canmaster::nmt::State;
+use canmaster::sdo::AbortCode;
+
+/// Who may do what.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Access {
+    /// 06010002h
+    Read,
+    /// What is read can be written back.
+    ReadWrite,
+    /// The same, but only in pre-operational: 08000022h.
+    ReadWritePreOperational,
+    /// 06010001h
+    Write,
+    /// Can be written, but not with what it reads as.
+    Command,
+}
+
+/// Index, sub-index, bytes (0: a string or domain), access.
+const OBJECTS: &[(u16, u8, usize, Access)] = {
+    use Access::{Command, Read, ReadWrite, ReadWritePreOperational, Write};
+    &[
+        (0x1000, 0, 4, Read),
+        (0x1001, 0, 1, Read),
+        (0x1002, 0, 4, Read),
+        (0x1003, 0, 1, ReadWrite),
+        (0x1005, 0, 4, ReadWritePreOperational),
+        (0x1006, 0, 4, ReadWritePreOperational),
+        (0x1007, 0, 4, ReadWritePreOperational),
+        (0x1008, 0, 0, Read),
+        (0x1009, 0, 0, Read),
+        (0x100A, 0, 0, Read),
+        (0x1010, 0, 1, Read),
+        (0x1010, 1, 4, Command),
+        (0x1011, 0, 1, Read),
+        (0x1011, 1, 4, Command),
+        (0x1012, 0, 4, ReadWrite),
+        (0x1014, 0, 4, ReadWrite),
+        (0x1015, 0, 2, ReadWrite),
+        (0x1016, 0, 1, Read),
+        (0x1016, 1, 4, ReadWrite),
+        (0x1016, 6, 4, ReadWrite),
+        (0x1017, 0, 2, ReadWrite),
+        (0x1018, 0, 1, Read),
+        (0x1018, 1, 4, Read),
+        (0x1018, 4, 4, Read),
+        (0x1020, 0, 1, Read),
+        (0x1020, 1, 4, ReadWrite),
+        (0x1020, 2, 4, ReadWrite),
+        (0x1028, 0, 1, Read),
+        (0x1028, 127, 4, Read),
+        (0x1029, 0, 1, Read),
+        (0x1029, 1, 1, ReadWrite),
+        (0x1200, 0, 1, Read),
+        (0x1200, 2, 4, Read),
+        (0x1280, 0, 1, Read),
+        (0x1285, 3, 1, Read),
+        (0x1400, 0, 1, Read),
+        (0x1400, 1, 4, Read),
+        (0x140B, 2, 1, Read),
+        (0x1600, 0, 1, Read),
+        (0x160B, 2, 4, Read),
+        (0x1800, 1, 4, Read),
+        (0x180B, 2, 1, Read),
+        (0x1A00, 1, 4, Read),
+        (0x1A0B, 2, 4, Read),
+        (0x1F22, 0, 1, Read),
+        (0x1F22, 6, 0, Read),
+        (0x1F25, 0, 1, Read),
+        (0x1F25, 1, 4, Write),
+        (0x1F25, 0x80, 4, Write),
+        (0x1F26, 0, 1, Read),
+        (0x1F26, 1, 4, Read),
+        (0x1F27, 127, 4, Read),
+        (0x1F80, 0, 4, ReadWrite),
+        (0x1F81, 0, 1, Read),
+        (0x1F81, 6, 4, ReadWrite),
+        (0x1F81, 7, 4, Read),
+        (0x1F82, 0, 1, Read),
+        (0x1F82, 1, 1, Command),
+        (0x1F82, 0x80, 1, Write),
+        (0x1F84, 1, 4, Read),
+        (0x1F85, 1, 4, Read),
+        (0x1F86, 1, 4, Read),
+        (0x1F87, 1, 4, Read),
+        (0x1F88, 127, 4, Read),
+        (0x1F89, 0, 4, ReadWrite),
+        (0x1F8A, 1, 1, Read),
+        (0x2F00, 1, 1, Read),
+        (0x2F01, 0, 1, Read),
+        (0x2F01, 127, 0, Read),
+        (0x2F02, 1, 0, Read),
+        (0x2F10, 0, 6, ReadWrite),
+        (0x2F11, 0, 2, ReadWrite),
+        (0x2F81, 0, 1, ReadWrite),
+        (0x3001, 0, 1, Read),
+        (0x3001, 1, 2, Read),
+        (0x3006, 8, 4, Read),
+    ]
+};
+
+fn bench(state: State) -> Bench {
+    let mut b = Bench::new();
+    // Only then 1019h can be written and the clock be read.
+    b.write(0x2F10, 0, &[0; 6]).unwrap();
+    b.events();
+    b.enter(state);
+    b
+}
+
+#[test]
+fn every_object_has_its_size_and_access_in_every_state() {
+    for state in [State::PreOperational, State::Operational] {
+        for &(index, sub, size, access) in OBJECTS {
+            let mut b = bench(state);
+            let name = std::format!("{index:04X}h:{sub:02X} in {state}");
+            let read = b.read(index, sub);
+            if access == Access::Write {
+                assert_eq!(read, Err(AbortCode::WRITE_ONLY), "{name}");
+            } else {
+                let data = read
+                    .as_ref()
+                    .unwrap_or_else(|code| panic!("{name}: {code}"));
+                assert!(size == 0 || data.len() == size, "{name}: {data:?}");
+            }
+            let data = match access {
+                // A word nobody accepts.
+                Access::Write | Access::Command => vec![0xEE; size],
+                _ => read.unwrap(),
+            };
+            let data = if size == 0 { vec![0; 5] } else { data };
+            let written = b.write(index, sub, &data);
+            match access {
+                Access::Read => assert_eq!(written, Err(AbortCode::READ_ONLY), "{name}"),
+                Access::ReadWrite => assert_eq!(written, Ok(()), "{name}"),
+                Access::ReadWritePreOperational => {
+                    let expected = match state {
+                        State::PreOperational => Ok(()),
+                        _ => Err(AbortCode::DEVICE_STATE),
+                    };
+                    assert_eq!(written, expected, "{name}");
+                }
+                Access::Command | Access::Write => {
+                    let refused = matches!(
+                        written,
+                        Err(AbortCode::CANNOT_STORE | AbortCode::VALUE_RANGE)
+                    );
+                    assert!(refused, "{name}: {written:?}");
+                }
+            }
+            if matches!(access, Access::ReadWrite) && size < 4 {
+                let long = b.write(index, sub, &vec![0; size + 1]);
+                assert_eq!(long, Err(AbortCode::TOO_LONG), "{name}");
+            }
+        }
+    }
+}
+
+#[test]
+fn nothing_answers_where_sdo_is_not_allowed() {
+    for state in [State::Initialising, State::Stopped] {
+        let mut b = bench(state);
+        for &(index, sub, ..) in OBJECTS {
+            let [low, high] = index.to_le_bytes();
+            assert_eq!(b.ask([0x40, low, high, sub, 0, 0, 0, 0]), None);
+            assert_eq!(b.ask([0x2F, low, high, sub, 0, 0, 0, 0]), None);
+        }
+        b.enter(State::PreOperational);
+        assert_eq!(b.events(), []);
+    }
+}
+
+#[test]
+fn a_transfer_ends_where_sdo_ends() {
+    let mut b = Bench::new();
+    b.ask([0x40, 0x08, 0x10, 0, 0, 0, 0, 0]);
+    b.enter(State::Stopped);
+    b.enter(State::PreOperational);
+    // 05040001h: there is no transfer to go on with.
+    b.expect(
+        [0x60, 0, 0, 0, 0, 0, 0, 0],
+        [0x80, 0, 0, 0, 0x01, 0, 0x04, 0x05],
+    );
+}
+
+#[test]
+fn what_does_not_exist() {
+    let mut b = Bench::new();
+    for (index, sub, code) in [
+        (0x0FFF, 0, AbortCode::NO_SUCH_OBJECT),
+        (0x1004, 0, AbortCode::NO_SUCH_OBJECT),
+        (0x100C, 0, AbortCode::NO_SUCH_OBJECT),
+        (0x1201, 0, AbortCode::NO_SUCH_OBJECT),
+        (0x1286, 0, AbortCode::NO_SUCH_OBJECT),
+        (0x140C, 0, AbortCode::NO_SUCH_OBJECT),
+        (0x1BFF, 0, AbortCode::NO_SUCH_OBJECT),
+        (0x1C00, 0, AbortCode::NO_SUCH_OBJECT),
+        (0x1F83, 0, AbortCode::NO_SUCH_OBJECT),
+        (0x2F80, 0, AbortCode::NO_SUCH_OBJECT),
+        (0x2F87, 0, AbortCode::NO_SUCH_OBJECT),
+        (0x3000, 0, AbortCode::NO_SUCH_OBJECT),
+        (0x3007, 0, AbortCode::NO_SUCH_OBJECT),
+        (0x6040, 0, AbortCode::NO_SUCH_OBJECT),
+        (0xFFFF, 255, AbortCode::NO_SUCH_OBJECT),
+        (0x1000, 1, AbortCode::NO_SUCH_SUB_INDEX),
+        (0x1003, 9, AbortCode::NO_SUCH_SUB_INDEX),
+        (0x1010, 2, AbortCode::NO_SUCH_SUB_INDEX),
+        (0x1016, 7, AbortCode::NO_SUCH_SUB_INDEX),
+        (0x1018, 5, AbortCode::NO_SUCH_SUB_INDEX),
+        (0x1028, 128, AbortCode::NO_SUCH_SUB_INDEX),
+        (0x1200, 3, AbortCode::NO_SUCH_SUB_INDEX),
+        (0x1280, 4, AbortCode::NO_SUCH_SUB_INDEX),
+        (0x1400, 3, AbortCode::NO_SUCH_SUB_INDEX),
+        (0x1600, 3, AbortCode::NO_SUCH_SUB_INDEX),
+        (0x1F25, 0x81, AbortCode::NO_SUCH_SUB_INDEX),
+        (0x1F81, 128, AbortCode::NO_SUCH_SUB_INDEX),
+        (0x2F81, 5, AbortCode::NO_SUCH_SUB_INDEX),
+        (0x3001, 9, AbortCode::NO_SUCH_SUB_INDEX),
+    ] {
+        let name = std::format!("{index:04X}h:{sub:02X}");
+        assert_eq!(b.read(index, sub), Err(code), "{name}");
+        assert_eq!(b.write_u8(index, sub, 0), Err(code), "{name}");
+    }
+}
+
+/// Reading the whole dictionary changes nothing and leaves nothing behind.
+#[test]
+fn the_whole_dictionary_can_be_walked() {
+    let mut b = Bench::new();
+    let mut found = 0;
+    for index in (0x1000..=0x3100).chain([0x6040, 0xA000]) {
+        for sub in 0..=255 {
+            match b.read(index, sub) {
+                Ok(_) | Err(AbortCode::WRITE_ONLY | AbortCode::NO_DATA) => found += 1,
+                Err(AbortCode::NO_SUCH_OBJECT | AbortCode::NO_SUCH_SUB_INDEX) => {}
+                Err(code) => panic!("{index:04X}h:{sub:02X}: {code}"),
+            }
+        }
+    }
+    assert!(found > 1500, "{found} entries");
+    assert_eq!(b.events(), []);
+}
