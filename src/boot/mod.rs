@@ -1,7 +1,7 @@
 //! Boot-up of the network after CiA 302-2: every node is awaited, identified,
 //! configured and watched, all of them in parallel, before any is started.
 //!
-//! [`NetworkBoot`] runs the network, a [`NodeBoot`](node::NodeBoot) per node
+//! [`NetworkBoot`] runs the network, a `NodeBoot` per node
 //! runs the steps of CiA 302-2, "Boot slave". A frame or the time goes in,
 //! [`Action`]s come out.
 

@@ -44,7 +44,7 @@ mod app {
         nmt,
         time::Instant,
     };
-    use core::sync::atomic::Ordering;
+    use core::{mem::MaybeUninit, sync::atomic::Ordering};
     use heapless::{
         Vec,
         spsc::{Consumer, Producer, Queue},
@@ -108,8 +108,8 @@ mod app {
     /// Sets up the board and hands each task its part. Runs with interrupts off,
     /// before anything can be late.
     #[init(local = [
-        axes_place: Option<Axes> = None,
-        boot_place: Option<NetworkBoot<AXES>> = None,
+        axes_place: MaybeUninit<Axes> = MaybeUninit::uninit(),
+        boot_place: MaybeUninit<NetworkBoot<AXES>> = MaybeUninit::uninit(),
         lengths: [[u8; TPDOS_PER_AXIS]; AXES] = [[0; TPDOS_PER_AXIS]; AXES],
         network_queue: FrameQueue = Queue::new(),
         answer_queue: FrameQueue = Queue::new(),
@@ -188,8 +188,8 @@ mod app {
     /// Makes a large value where it is to stay. Not in `init` itself: what stands
     /// in its frame lies below every interrupt's for ever.
     #[inline(never)]
-    fn place<T>(place: &'static mut Option<T>, new: fn() -> T) -> &'static mut T {
-        place.insert(new())
+    fn place<T>(place: &'static mut MaybeUninit<T>, new: fn() -> T) -> &'static mut T {
+        place.write(new())
     }
 
     fn new_axes() -> Axes {
