@@ -41,6 +41,10 @@ const STACKING_EXCESS_CYCLES: u64 = 8;
 const LOCKED_PC: u32 = 0xFFFF_FFFE;
 const HARD_FAULT: u32 = 3;
 const EXCEPTION_MASK: u32 = 0x1FF;
+/// Bits of xPSR that hold the state of an IF-THEN block.
+const IF_THEN_MASK: u32 = 0x0600_FC00;
+/// The link register holds at least this in a handler that was just entered.
+const EXC_RETURN: u32 = 0xFFFF_FFE0;
 
 /// The emulated board.
 #[derive(Debug)]
@@ -67,6 +71,8 @@ pub struct Board {
     unrouted: Vec<(u8, u64)>,
     pub(super) measure: Measure,
     exception: u32,
+    /// The IF-THEN bits of xPSR after the last step.
+    if_then: u32,
     basepri: u8,
     sync_priority: u8,
     pub(super) stats_from: u64,
@@ -127,6 +133,7 @@ impl Board {
             unrouted: Vec::new(),
             measure: Measure::default(),
             exception: 0,
+            if_then: 0,
             basepri: 0,
             sync_priority: 0,
             stats_from: 0,
@@ -192,11 +199,15 @@ impl Board {
         let pc = regs.r[15];
         let exception = regs.xpsr & EXCEPTION_MASK;
         if exception != self.exception {
+            if self.if_then != 0 {
+                self.keep_if_then(&regs);
+            }
             self.exception = exception;
             if used >= STACKING_STEP_CYCLES {
                 used -= STACKING_EXCESS_CYCLES;
             }
         }
+        self.if_then = regs.xpsr & IF_THEN_MASK;
         self.cycle += used;
         self.shared.cycle.store(self.cycle, Ordering::Relaxed);
         self.shared.pc.store(pc, Ordering::Relaxed);
@@ -225,6 +236,28 @@ impl Board {
             return self.fault(&regs, exception);
         }
         None
+    }
+
+    /// An exception was taken within an IF-THEN block: its state belongs into
+    /// the stacked xPSR (DDI 0403, B1.5.6), where the emulator writes zeros, so
+    /// that the rest of the block would run unconditionally after the return.
+    #[cold]
+    fn keep_if_then(&mut self, regs: &Regs) {
+        /// Places in the exception frame.
+        const RETURN_ADDRESS: u32 = 24;
+        const XPSR: u32 = 28;
+        let frame = regs.r[13];
+        let Some(xpsr) = self.memory.word(frame.wrapping_add(XPSR)) else {
+            return;
+        };
+        // A return from an exception, within such a block, stacks nothing.
+        let entered = self.memory.word(frame.wrapping_add(RETURN_ADDRESS)) == Some(self.pc)
+            && xpsr & EXCEPTION_MASK == self.exception
+            && regs.r[14] >= EXC_RETURN;
+        if entered && xpsr & IF_THEN_MASK == 0 {
+            self.memory
+                .poke(frame.wrapping_add(XPSR), xpsr | self.if_then);
+        }
     }
 
     /// The program counter did not move in a step of one cycle: the core
@@ -404,6 +437,7 @@ impl Board {
         self.locked = false;
         self.in_fault = false;
         self.exception = 0;
+        self.if_then = 0;
         self.basepri = 0;
         self.pc = 0;
     }

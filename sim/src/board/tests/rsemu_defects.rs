@@ -41,3 +41,35 @@ fn exception_entry_is_charged_twenty_cycles() {
     core.step();
     assert_eq!(core.step(), 1 + 12 + 8, "SVC, then the entry");
 }
+
+/// An exception within an IF-THEN block stacks the block's state with xPSR, and
+/// the return goes on with it (DDI 0403, B1.5.6). The emulator stacks zeros and
+/// then runs the rest of the block unconditionally; `Board::step` puts the
+/// state back.
+#[test]
+fn an_interrupt_within_an_if_then_block_does_not_end_it() {
+    use super::{Program, SRAM, TIM_SR, TIM2, TIM2_EXCEPTION, load, store};
+    use crate::time::Time;
+    const MOVS_R2_0: u16 = 0x2200;
+    const MOVS_R3_0: u16 = 0x2300;
+    const CMP_R2_1: u16 = 0x2A01;
+    const ITTTT_EQ: u16 = 0xBF01;
+    const ADDEQ_R3_1: u16 = 0x3301;
+    const BRANCH_TO_CMP: u16 = 0xE7F8;
+    const STR_R3_R0: u16 = 0x6003;
+
+    let mut handler = store(TIM2 + TIM_SR, 0);
+    handler.extend(load(0, SRAM));
+    handler.push(STR_R3_R0);
+    // 101 is a prime: the interrupts fall on every instruction of the loop.
+    let mut board = Program::default()
+        .tim2_every(101)
+        .then([MOVS_R2_0, MOVS_R3_0, CMP_R2_1, ITTTT_EQ])
+        .then([ADDEQ_R3_1; 4])
+        .then([BRANCH_TO_CMP])
+        .handler(TIM2_EXCEPTION, handler)
+        .board();
+    board.run(Time::from_ms(10));
+    assert!(board.stats().irq(28).expect("was taken").count > 1000);
+    assert_eq!(board.word(SRAM), Some(0), "r2 is never 1");
+}
