@@ -3,10 +3,11 @@
 use super::cia402::{Machine, Options, Power, Ramp, State};
 use super::dictionary::Dictionary;
 use super::errors::Reaction;
-use super::modes::{Cycle, Limits, Mode, Modes};
+use super::modes::{Cycle, Demand, FOLLOWING_ERROR, INTERNAL_LIMIT, Limits, Mode, Modes};
 use super::plant::PlantState;
 use super::ramp::{self, Slopes};
-use super::servo::{Servo, Standstill};
+use super::servo::{Follow, Servo, Standstill};
+use super::{errors, position, supervision};
 
 /// Bit 7 of the statusword.
 const WARNING: u16 = 1 << 7;
@@ -14,6 +15,8 @@ const WARNING: u16 = 1 << 7;
 const VOLTAGE_ENABLED: u16 = 1 << 4;
 /// Bit 9 of the statusword.
 const REMOTE: u16 = 1 << 9;
+/// Bit 15 of the statusword: referenced to home.
+const REFERENCED: u16 = 1 << 15;
 
 /// The axis.
 #[derive(Clone, Debug)]
@@ -25,6 +28,12 @@ pub(super) struct Axis {
     mode_bits: u16,
     /// rpm; meaningless while the power stage is off.
     demand: f64,
+    /// Position demand, increments, of a mode that controls the position.
+    target: Option<f64>,
+    /// Position minus count of the encoder: homing changes it.
+    shift: i64,
+    /// Bit 15 of the statusword.
+    referenced: bool,
     /// How long a ramp has been at zero, seconds.
     waited_s: f64,
 }
@@ -39,6 +48,9 @@ impl Axis {
             mode: Mode::ProfilePosition,
             mode_bits: 0,
             demand: 0.0,
+            target: None,
+            shift: 0,
+            referenced: false,
             waited_s: 0.0,
         }
     }
@@ -48,6 +60,9 @@ impl Axis {
         self.machine = Machine::new();
         self.modes = Modes::default();
         self.mode_bits = 0;
+        self.target = None;
+        self.shift = 0;
+        self.referenced = false;
     }
 
     /// What is true.
@@ -77,6 +92,11 @@ impl Axis {
 
     /// A controlword was written. True if a fault was reset.
     pub(super) fn control(&mut self, od: &Dictionary) -> bool {
+        self.modes.control(od, self.servo.per_rpm());
+        self.command(od)
+    }
+
+    fn command(&mut self, od: &Dictionary) -> bool {
         let controlword = od.number(0x6040, 0) as u16;
         let may_reset = od.errors.may_reset();
         self.machine.control(controlword, options(od), may_reset)
@@ -87,6 +107,22 @@ impl Axis {
         self.machine.fault(reaction, options(od));
     }
 
+    /// A set value was written.
+    pub(super) fn set(&mut self, index: u16, od: &Dictionary, now_s: f64) {
+        self.modes.set(index, od, now_s);
+    }
+
+    /// Another load on the shaft, per mille of rated torque.
+    pub(super) fn set_load(&mut self, permille: f64) {
+        self.servo.set_load(permille);
+    }
+
+    /// Whether a control cycle can end in an error by itself.
+    pub(super) fn may_fail(&self, od: &Dictionary) -> bool {
+        let has_switches = self.servo.travel().has_limit_switch();
+        self.machine.power() == Power::Run && supervision::is_needed(self.mode, od, has_switches)
+    }
+
     /// NMT takes the drive out of operational.
     pub(super) fn connection_ends(&mut self, od: &Dictionary) {
         self.machine.connection_ends(options(od));
@@ -95,11 +131,19 @@ impl Axis {
     /// One control cycle while the drive has no supply, or before it runs.
     pub(super) fn coast(&mut self, own_s: f64, true_s: f64) {
         self.demand = 0.0;
-        self.servo.step(None, Standstill::DEFAULT, own_s, true_s);
+        let still = Standstill::DEFAULT;
+        self.servo.step(Follow::Nothing, still, own_s, true_s);
     }
 
-    /// One control cycle; the measured values go into the dictionary.
-    pub(super) fn cycle(&mut self, od: &mut Dictionary, own_s: f64, true_s: f64) {
+    /// One control cycle; the measured values go into the dictionary. Answers
+    /// the error in which it ends.
+    pub(super) fn cycle(
+        &mut self,
+        od: &mut Dictionary,
+        own_s: f64,
+        true_s: f64,
+        now_s: f64,
+    ) -> Option<u16> {
         let standstill = Standstill {
             speed_rpm: od.number(0x30E0, 1) as f64,
             window_s: od.number(0x30E0, 2) as f64 / 1000.0,
@@ -107,21 +151,21 @@ impl Axis {
         if let Some(mode) = Mode::from_code(od.number(0x6060, 0) as i8) {
             self.mode = mode;
         }
-        let demand = self.follow(od, own_s);
-        self.servo.step(demand, standstill, own_s, true_s);
-        self.demand = demand.unwrap_or(0.0);
+        let (follow, error) = self.follow(od, own_s, now_s);
+        self.servo.step(follow, standstill, own_s, true_s);
 
         let timeout_s = od.number(0x30E0, 3) as f64 / 1000.0;
         let at_rest = self.at_rest(own_s, timeout_s);
         if self.machine.cycle(at_rest) {
             // What was asked for during the ramp counts now.
-            self.control(od);
+            self.command(od);
         }
         self.publish(od);
+        error
     }
 
-    /// The speed to follow; `None` without torque.
-    fn follow(&mut self, od: &Dictionary, own_s: f64) -> Option<f64> {
+    /// What the servo follows, and the error that was noticed.
+    fn follow(&mut self, od: &Dictionary, own_s: f64, now_s: f64) -> (Follow, Option<u16>) {
         let limits = Limits::read(od);
         let measured = self.servo.measured();
         // A ramp starts from the speed that the axis has.
@@ -132,24 +176,31 @@ impl Axis {
         };
         let power = self.machine.power();
         if power != Power::Run {
-            self.mode_bits = self.modes.idle_bits(self.mode, measured);
+            self.target = None;
+            self.mode_bits = self.modes.idle(self.mode, measured);
+            let positioning = matches!(self.mode, Mode::ProfilePosition | Mode::CyclicPosition);
+            if positioning && od.errors.is_active(errors::FOLLOWING) {
+                self.mode_bits |= FOLLOWING_ERROR;
+            }
         }
         match power {
-            Power::Off => None,
-            Power::Run => {
-                let outcome = self.modes.step(
-                    self.mode,
-                    Cycle {
-                        od,
-                        limits,
-                        measured,
-                        demand: before,
-                        seconds: own_s,
-                    },
-                );
-                self.mode_bits = outcome.bits;
-                Some(outcome.demand)
+            Power::Off => {
+                self.demand = 0.0;
+                (Follow::Nothing, None)
             }
+            Power::Run => self.run(&Cycle {
+                od,
+                limits,
+                measured,
+                position: measured.count + self.shift,
+                index: measured.index.map(|at| at + self.shift),
+                inputs: self.servo.inputs(),
+                current_ma: self.current_ma(measured.torque),
+                demand: before,
+                per_rpm: self.servo.per_rpm(),
+                seconds: own_s,
+                now_s,
+            }),
             Power::Stop(kind) => {
                 let slopes = match kind {
                     Ramp::SlowDown => limits.profile,
@@ -158,9 +209,57 @@ impl Axis {
                         ..limits.profile
                     },
                 };
-                Some(ramp::step(before, 0.0, slopes, own_s))
+                self.demand = ramp::step(before, 0.0, slopes, own_s);
+                (Follow::Speed(self.demand), None)
             }
         }
+    }
+
+    /// The mode moves the axis.
+    fn run(&mut self, cycle: &Cycle<'_>) -> (Follow, Option<u16>) {
+        let outcome = self.modes.step(self.mode, cycle);
+        self.mode_bits = outcome.bits;
+        let (mut error, mut position) = (None, cycle.position);
+        if let Some(shift) = outcome.shift {
+            self.shift += shift;
+            position += shift;
+            self.referenced = true;
+            self.target = None;
+        }
+        let follow = match outcome.demand {
+            Demand::Position(motion) => {
+                // Both as they were when the last cycle ended.
+                let following = self.target.unwrap_or(position as f64) - position as f64;
+                self.target = Some(motion.position);
+                self.demand = motion.rate / cycle.per_rpm;
+                error = supervision::check(self.mode, cycle, &outcome, Some(following));
+                let time_constant_s = self.servo.config().time_constant_s;
+                let wanted = position::speed(motion, following, time_constant_s, cycle.per_rpm);
+                let speed = wanted.clamp(-cycle.limits.motor, cycle.limits.motor);
+                if speed != wanted {
+                    self.mode_bits |= INTERNAL_LIMIT;
+                }
+                Follow::Speed(speed)
+            }
+            Demand::Speed(speed) => {
+                self.target = None;
+                self.demand = speed;
+                Follow::Speed(speed)
+            }
+            Demand::Torque(permille) => {
+                self.target = None;
+                self.demand = cycle.measured.velocity;
+                Follow::Torque(permille)
+            }
+        };
+        if self.target.is_none() {
+            error = supervision::check(self.mode, cycle, &outcome, None);
+        }
+        (follow, error)
+    }
+
+    fn current_ma(&self, torque_permille: f64) -> f64 {
+        torque_permille / 1000.0 * self.servo.config().rated_current_ma
     }
 
     /// A ramp has come to zero and the axis stands, or does not within
@@ -188,6 +287,9 @@ impl Axis {
         if remote {
             word |= REMOTE;
         }
+        if self.referenced {
+            word |= REFERENCED;
+        }
         word
     }
 
@@ -198,8 +300,16 @@ impl Axis {
         let statusword = self.statusword(od.operational, od.errors.warning());
         od.put(0x6041, 0, statusword.into());
         od.put(0x6061, 0, self.mode.code().into());
-        od.put(0x6062, 0, measured.position.into());
-        od.put(0x6064, 0, measured.position.into());
+        let position = measured.count + self.shift;
+        let target = self.target.map_or(position, |target| target.round() as i64);
+        let following = (target - position).clamp(i32::MIN.into(), i32::MAX.into());
+        od.put(0x6062, 0, target);
+        od.put(0x6064, 0, position);
+        od.put(0x60F4, 0, following);
+        od.put(0x60FD, 0, self.servo.inputs().bits().into());
+        let current = |torque| self.current_ma(torque).round() as i64;
+        od.put(0x30D1, 1, current(measured.torque_averaged));
+        od.put(0x30D1, 2, current(measured.torque));
         od.put(0x606B, 0, speed(self.demand));
         od.put(0x606C, 0, speed(measured.velocity));
         od.put(0x30D3, 1, speed(measured.velocity_averaged));

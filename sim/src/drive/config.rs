@@ -203,6 +203,22 @@ pub enum DriveFault {
         /// When it is back.
         on: Time,
     },
+    /// A load comes on the shaft, in addition to friction and in place of the
+    /// load configured.
+    Load {
+        /// Since when.
+        at: Time,
+        /// Torque, per mille of rated torque; positive drives in the positive
+        /// direction.
+        permille: i32,
+    },
+    /// Safe torque off: no torque, 8A88h, and no reset as long as it lasts.
+    Sto {
+        /// Since when.
+        at: Time,
+        /// Until when; `None`: for ever.
+        until: Option<Time>,
+    },
     /// An error occurs in the drive: EMCY and reaction as its code has them.
     Error {
         /// When.

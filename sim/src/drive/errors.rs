@@ -34,6 +34,19 @@ pub const TRANSMIT_QUEUE: u16 = 0x81FF;
 /// RPDO shorter than its mapping (8210h).
 pub const PDO_LENGTH: u16 = 0x8210;
 
+/// No set value has come in time (8250h).
+pub const RPDO_TIMEOUT: u16 = 0x8250;
+/// Following error (8611h).
+pub const FOLLOWING: u16 = 0x8611;
+/// Negative limit switch (8A80h).
+pub const NEGATIVE_LIMIT: u16 = 0x8A80;
+/// Positive limit switch (8A81h).
+pub const POSITIVE_LIMIT: u16 = 0x8A81;
+/// Software position limit (8A82h).
+pub const SOFTWARE_LIMIT: u16 = 0x8A82;
+/// Safe torque off (8A88h).
+pub const STO: u16 = 0x8A88;
+
 /// First code, last code, bits of 1001h, reaction.
 type Row = (u16, u16, u8, Reaction);
 
@@ -76,10 +89,15 @@ const TABLE: &[Row] = &[
     ),
     (BUS_OFF, TRANSMIT_QUEUE, 0x10, Reaction::AbortConnection),
     (PDO_LENGTH, PDO_LENGTH, 0x10, Reaction::AbortConnection),
-    (0x8250, 0x8250, 0x10, Reaction::AbortConnection),
-    (0x8611, 0x8611, 0x80, Reaction::FaultReaction),
-    (0x8A80, 0x8A82, 0x80, Reaction::FaultReaction),
-    (0x8A88, 0x8A88, 0x01, Reaction::Disable),
+    (RPDO_TIMEOUT, RPDO_TIMEOUT, 0x10, Reaction::AbortConnection),
+    (FOLLOWING, FOLLOWING, 0x80, Reaction::FaultReaction),
+    (
+        NEGATIVE_LIMIT,
+        SOFTWARE_LIMIT,
+        0x80,
+        Reaction::FaultReaction,
+    ),
+    (STO, STO, 0x01, Reaction::Disable),
     (0xFF01, 0xFF01, 0x00, Reaction::Warning),
     (0xFF02, 0xFF02, 0x00, Reaction::Warning),
     (0xFF0B, 0xFF0B, 0x01, Reaction::Disable),
@@ -160,6 +178,11 @@ impl Errors {
         self.active
             .iter()
             .fold(0, |bits, &code| bits | classify(code).0)
+    }
+
+    /// Whether `code` has occurred and was not reset.
+    pub fn is_active(&self, code: u16) -> bool {
+        self.active.contains(&code)
     }
 
     /// Whether a warning is active (bit 7 of the statusword).

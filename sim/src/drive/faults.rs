@@ -1,7 +1,7 @@
 //! Faults of the configuration, turned into what the drive does.
 
 use super::config::DriveFault;
-use super::{Drive, Job, Planned};
+use super::{Drive, Job, Planned, errors};
 use crate::time::Time;
 use canmaster::id::Address;
 use canmaster::sdo::AbortCode;
@@ -35,6 +35,20 @@ impl Drive {
             DriveFault::PowerCycle { off, on } => {
                 self.plan_always(off, Job::PowerOff);
                 self.plan_always(on, Job::PowerOn);
+            }
+            DriveFault::Load { at, permille } => self.plan_always(at, Job::Load(permille)),
+            DriveFault::Sto { at, until } => {
+                let code = errors::STO;
+                self.plan_always(
+                    at,
+                    Job::Error {
+                        code,
+                        lasting: true,
+                    },
+                );
+                if let Some(until) = until {
+                    self.plan_always(until, Job::CauseGone(code));
+                }
             }
             DriveFault::Error { at, code, until } => {
                 let lasting = until.is_some();

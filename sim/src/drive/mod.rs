@@ -11,8 +11,7 @@
 //! is made.
 //!
 //! Not modelled: current control (torque is there at once), supply voltage and
-//! its speed limit, digital inputs and outputs, modes other than profile
-//! velocity.
+//! its speed limit, digital outputs, a change of velocity units under way.
 
 mod axis;
 mod bit_rate;
@@ -32,14 +31,17 @@ mod network;
 pub mod objects;
 mod pdo;
 pub mod plant;
+mod position;
 mod ramp;
 mod random;
 mod service;
 pub mod servo;
 mod status;
 mod store;
+mod supervision;
 #[cfg(test)]
 mod tests;
+pub mod travel;
 
 pub use config::{DriveConfig, DriveFault, Identity, Spread};
 pub use plant::PlantState;
@@ -63,6 +65,9 @@ use random::Random;
 use service::SdoService;
 use servo::Servo;
 
+/// Microseconds in a second.
+const US_PER_S: f64 = 1e6;
+
 /// Something that the drive does at a moment known before.
 #[derive(Clone, Debug)]
 enum Job {
@@ -84,6 +89,8 @@ enum Job {
     SpeakAgain,
     /// The pause after bus-off is over.
     BusOffOver,
+    /// Another load on the shaft, per mille of rated torque.
+    Load(i32),
     /// An error of the configuration occurs.
     Error { code: u16, lasting: bool },
     /// Its cause is gone.
@@ -269,6 +276,7 @@ impl Drive {
             Job::SwitchBitRate => self.switch_bit_rate(),
             Job::SpeakAgain => self.speak_again(),
             Job::BusOffOver => self.bus_off_over(),
+            Job::Load(permille) => self.axis.set_load(permille.into()),
             Job::Error { code, lasting } => self.raise(code, lasting),
             Job::CauseGone(code) => self.cause_gone(code),
         }
@@ -291,7 +299,11 @@ impl Drive {
         match self.life {
             Life::Off | Life::Starting => self.axis.coast(own_s, true_s),
             _ => {
-                self.axis.cycle(&mut self.od, own_s, true_s);
+                let now_s = self.own_seconds();
+                let error = self.axis.cycle(&mut self.od, own_s, true_s, now_s);
+                if let Some(code) = error {
+                    self.raise(code, false);
+                }
                 self.send_events();
                 self.finish_reset();
             }
@@ -302,7 +314,13 @@ impl Drive {
     /// Whether a control cycle can make the drive say something by itself.
     fn watched_cycle(&self) -> bool {
         matches!(self.life, Life::Resetting)
+            || self.axis.may_fail(&self.od)
             || (self.nmt.allows(NmtService::Pdo) && self.exchange.has_events())
+    }
+
+    /// The drive's own clock in seconds.
+    fn own_seconds(&self) -> f64 {
+        self.clock.own(self.now).as_micros() as f64 / US_PER_S
     }
 
     fn transmit(&mut self, frame: impl Into<WireFrame>) {

@@ -6,6 +6,7 @@
 //! acceleration in rpm/s.
 
 use super::random::Random;
+use super::travel::Travel;
 
 /// Integration steps per control cycle of the drive: 0.1 ms each.
 const SUB_STEPS: u32 = 4;
@@ -33,6 +34,11 @@ pub struct PlantConfig {
     pub disturbance_hz: f64,
     /// Position at power-on, increments.
     pub start_position: f64,
+    /// Torque of the load on the shaft, per mille of rated torque: weight.
+    /// Positive drives in the positive direction.
+    pub load_permille: f64,
+    /// Hard stops, switches, index pulses.
+    pub travel: Travel,
 }
 
 impl Default for PlantConfig {
@@ -46,6 +52,8 @@ impl Default for PlantConfig {
             disturbance_permille: 10.0,
             disturbance_hz: 20.0,
             start_position: 0.0,
+            load_permille: 0.0,
+            travel: Travel::default(),
         }
     }
 }
@@ -96,13 +104,24 @@ impl Plant {
         self.state.position_inc.round() as i64
     }
 
+    /// How it is built.
+    pub fn config(&self) -> &PlantConfig {
+        &self.config
+    }
+
+    /// Another load, per mille of rated torque.
+    pub fn set_load(&mut self, permille: f64) {
+        self.config.load_permille = permille;
+    }
+
     /// One control cycle of `seconds` true time with constant motor torque.
     pub fn step(&mut self, torque: f64, seconds: f64) {
         self.disturb(seconds);
         self.state.torque = torque;
         let dt = seconds / f64::from(SUB_STEPS);
         for _ in 0..SUB_STEPS {
-            self.sub_step(torque + self.disturbance, dt);
+            let load = self.config.load_permille / 1000.0;
+            self.sub_step(torque + self.disturbance + load, dt);
         }
     }
 
@@ -124,7 +143,14 @@ impl Plant {
         };
         let way = (speed + next) / 2.0 * dt / SECONDS_PER_MINUTE
             * f64::from(self.config.increments_per_turn);
-        self.state.position_inc += way;
+        let to = self.state.position_inc + way;
+        if let Some(stop) = self.config.travel.stop(to) {
+            self.state.travelled_inc += (stop - self.state.position_inc).abs();
+            self.state.position_inc = stop;
+            self.state.velocity_rpm = 0.0;
+            return;
+        }
+        self.state.position_inc = to;
         self.state.travelled_inc += way.abs();
         self.state.velocity_rpm = next;
     }

@@ -162,6 +162,10 @@ impl Drive {
                 0x1016 => self.set_consumer(at.sub.0),
                 0x1017 => self.set_producer(),
                 0x6040 => self.on_controlword(),
+                index @ (0x607A | 0x60FF | 0x6071) => {
+                    let now_s = self.own_seconds();
+                    self.axis.set(index, &self.od, now_s);
+                }
                 RPDO_COMMUNICATION..=LAST_PDO_OBJECT => pdos = true,
                 _ => {}
             }

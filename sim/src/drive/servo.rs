@@ -8,6 +8,7 @@
 
 use super::plant::{Plant, PlantConfig, PlantState};
 use super::random::Random;
+use super::travel::{Inputs, Travel};
 
 /// When the axis counts as standing (30E0h).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,6 +27,19 @@ impl Standstill {
     };
 }
 
+/// What the loop follows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Follow {
+    /// Nothing: the power stage is off.
+    Nothing,
+    /// A speed, rpm.
+    Speed(f64),
+    /// A torque, per mille of rated torque.
+    Torque(f64),
+}
+
+/// Seconds in a minute.
+const SECONDS_PER_MINUTE: f64 = 60.0;
 /// Averaging time of 30D2h:1 and 30D3h:1, seconds.
 const AVERAGING_S: f64 = 0.01;
 
@@ -40,6 +54,8 @@ pub struct ServoConfig {
     pub velocity_noise_rpm: f64,
     /// Noise of 6077h, per mille of rated torque, uniform to both sides.
     pub torque_noise_permille: f64,
+    /// Current at rated torque, mA.
+    pub rated_current_ma: f64,
 }
 
 impl Default for ServoConfig {
@@ -49,6 +65,7 @@ impl Default for ServoConfig {
             peak_torque_permille: 2000.0,
             velocity_noise_rpm: 1.0,
             torque_noise_permille: 2.0,
+            rated_current_ma: 1000.0,
         }
     }
 }
@@ -56,8 +73,10 @@ impl Default for ServoConfig {
 /// What the drive measures.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Measured {
-    /// 6064h: increments, wrapping at 32 bits as the drive's counter does.
-    pub position: i32,
+    /// Increments since the encoder was built, not wrapped.
+    pub count: i64,
+    /// The index pulse that was passed in the last cycle.
+    pub index: Option<i64>,
     /// 606Ch, rpm.
     pub velocity: f64,
     /// 30D3h:1, rpm, averaged.
@@ -81,6 +100,7 @@ pub struct Servo {
     /// Speed of the first-order model, rpm; `None` while the power stage is off.
     model: Option<f64>,
     integral: f64,
+    powered: bool,
     quiet_s: f64,
     measured: Measured,
 }
@@ -91,7 +111,7 @@ impl Servo {
         let inertia = 1.0 / plant.rated_acceleration;
         let plant = Plant::new(plant, Random::new(seed, super::random::DISTURBANCE));
         let measured = Measured {
-            position: plant.encoder() as i32,
+            count: plant.encoder(),
             standstill: true,
             ..Measured::default()
         };
@@ -102,6 +122,7 @@ impl Servo {
             noise: Random::new(seed, super::random::MEASUREMENT),
             model: None,
             integral: 0.0,
+            powered: false,
             quiet_s: Standstill::DEFAULT.window_s,
             measured,
         }
@@ -112,6 +133,31 @@ impl Servo {
         self.plant.state()
     }
 
+    /// The switches.
+    pub fn inputs(&self) -> Inputs {
+        self.travel().inputs(self.plant.state().position_inc)
+    }
+
+    /// Ends and switches of the axis.
+    pub fn travel(&self) -> &Travel {
+        &self.plant.config().travel
+    }
+
+    /// Another load on the shaft, per mille of rated torque.
+    pub fn set_load(&mut self, permille: f64) {
+        self.plant.set_load(permille);
+    }
+
+    /// Increments per second and rpm.
+    pub fn per_rpm(&self) -> f64 {
+        f64::from(self.plant.config().increments_per_turn) / SECONDS_PER_MINUTE
+    }
+
+    /// How the loop is set.
+    pub fn config(&self) -> &ServoConfig {
+        &self.config
+    }
+
     /// What the drive knows.
     pub fn measured(&self) -> Measured {
         self.measured
@@ -119,24 +165,33 @@ impl Servo {
 
     /// Whether the motor had torque in the last cycle.
     pub fn powered(&self) -> bool {
-        self.model.is_some()
+        self.powered
     }
 
-    /// One control cycle: `demand` in rpm, or `None` with the power stage off.
-    /// `own_s` is the cycle as the drive's clock has it, `true_s` as it is.
-    pub fn step(&mut self, demand: Option<f64>, still: Standstill, own_s: f64, true_s: f64) {
+    /// One control cycle. `own_s` is the cycle as the drive's clock has it, `true_s` as it is.
+    pub fn step(&mut self, demand: Follow, still: Standstill, own_s: f64, true_s: f64) {
         // The drive divides increments by its own idea of time.
         let seen = self.plant.state().velocity_rpm * true_s / own_s;
         let torque = match demand {
-            Some(demand) => self.control(demand, seen, own_s),
-            None => {
-                self.model = None;
-                self.integral = 0.0;
+            Follow::Speed(speed) => self.control(speed, seen, own_s),
+            Follow::Torque(permille) => {
+                self.forget();
+                let limit = self.config.peak_torque_permille;
+                permille.clamp(-limit, limit) / 1000.0
+            }
+            Follow::Nothing => {
+                self.forget();
                 0.0
             }
         };
+        self.powered = demand != Follow::Nothing;
         self.plant.step(torque, true_s);
         self.measure(torque, still, own_s, true_s);
+    }
+
+    fn forget(&mut self) {
+        self.model = None;
+        self.integral = 0.0;
     }
 
     fn control(&mut self, demand: f64, seen: f64, dt: f64) -> f64 {
@@ -169,8 +224,11 @@ impl Servo {
         } else {
             0.0
         };
+        let (before, count) = (self.measured.count, self.plant.encoder());
+        let turn = self.plant.config().increments_per_turn;
         self.measured = Measured {
-            position: self.plant.encoder() as i32,
+            count,
+            index: self.travel().index_between(before, count, turn),
             velocity: noisy,
             velocity_averaged: averaged(self.measured.velocity_averaged, noisy),
             torque,
@@ -204,11 +262,11 @@ mod tests {
     /// Time until 63 % of a step of 50 rpm on top of 1000 rpm.
     fn rise(servo: &mut Servo) -> f64 {
         for _ in 0..2500 {
-            servo.step(Some(1000.0), Standstill::DEFAULT, DT, DT);
+            servo.step(Follow::Speed(1000.0), Standstill::DEFAULT, DT, DT);
         }
         let mut steps = 0;
         while servo.truth().velocity_rpm < 1000.0 + 50.0 * 0.632 {
-            servo.step(Some(1050.0), Standstill::DEFAULT, DT, DT);
+            servo.step(Follow::Speed(1050.0), Standstill::DEFAULT, DT, DT);
             steps += 1;
         }
         f64::from(steps) * DT
@@ -233,14 +291,14 @@ mod tests {
             for (tau, ratio, friction) in [(0.003, 0.7, 20.0), (0.010, 1.3, 50.0)] {
                 let mut s = servo(tau, ratio, friction, seed);
                 for _ in 0..1000 {
-                    s.step(Some(1500.0), Standstill::DEFAULT, DT, DT);
+                    s.step(Follow::Speed(1500.0), Standstill::DEFAULT, DT, DT);
                 }
                 for _ in 0..2500 {
-                    s.step(Some(0.0), Standstill::DEFAULT, DT, DT);
+                    s.step(Follow::Speed(0.0), Standstill::DEFAULT, DT, DT);
                 }
                 let stopped = s.truth();
                 for _ in 0..25_000 {
-                    s.step(Some(0.0), Standstill::DEFAULT, DT, DT);
+                    s.step(Follow::Speed(0.0), Standstill::DEFAULT, DT, DT);
                 }
                 let creep = s.truth().travelled_inc - stopped.travelled_inc;
                 assert!(creep < 0.5, "seed {seed} tau {tau}: {creep} increments");
@@ -253,11 +311,11 @@ mod tests {
     fn constant_demand_is_held_on_average() {
         let mut s = servo(0.010, 1.3, 50.0, 9);
         for _ in 0..2500 {
-            s.step(Some(-2000.0), Standstill::DEFAULT, DT, DT);
+            s.step(Follow::Speed(-2000.0), Standstill::DEFAULT, DT, DT);
         }
         let from = s.truth().position_inc;
         for _ in 0..25_000 {
-            s.step(Some(-2000.0), Standstill::DEFAULT, DT, DT);
+            s.step(Follow::Speed(-2000.0), Standstill::DEFAULT, DT, DT);
         }
         let way = s.truth().position_inc - from;
         let exact = -2000.0 / 60.0 * 2000.0 * 10.0;
@@ -268,12 +326,12 @@ mod tests {
     fn without_power_the_axis_coasts_and_the_loop_forgets() {
         let mut s = servo(0.005, 1.0, 20.0, 2);
         for _ in 0..2500 {
-            s.step(Some(600.0), Standstill::DEFAULT, DT, DT);
+            s.step(Follow::Speed(600.0), Standstill::DEFAULT, DT, DT);
         }
-        s.step(None, Standstill::DEFAULT, DT, DT);
+        s.step(Follow::Nothing, Standstill::DEFAULT, DT, DT);
         assert!(s.truth().velocity_rpm > 590.0);
         assert_eq!(s.truth().torque, 0.0);
-        s.step(Some(600.0), Standstill::DEFAULT, DT, DT);
+        s.step(Follow::Speed(600.0), Standstill::DEFAULT, DT, DT);
         assert!(s.truth().torque.abs() < 0.1, "no jump when switched on");
     }
 
@@ -281,7 +339,7 @@ mod tests {
     fn reported_velocity_is_within_its_noise() {
         let mut s = servo(0.005, 1.0, 35.0, 4);
         for _ in 0..1000 {
-            s.step(None, Standstill::DEFAULT, DT, DT);
+            s.step(Follow::Nothing, Standstill::DEFAULT, DT, DT);
             assert!(s.measured().velocity.abs() <= 1.0);
         }
     }
@@ -291,7 +349,7 @@ mod tests {
         let mut s = servo(0.005, 1.0, 35.0, 5);
         let true_s = DT * (1.0 - 1e-4);
         for _ in 0..50_000 {
-            s.step(Some(3000.0), Standstill::DEFAULT, DT, true_s);
+            s.step(Follow::Speed(3000.0), Standstill::DEFAULT, DT, true_s);
         }
         // Its second is shorter, so that it turns faster than it believes.
         let velocity = s.truth().velocity_rpm;

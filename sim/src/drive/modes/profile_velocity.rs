@@ -1,7 +1,7 @@
 //! Profile velocity (CiA 402-2, 16): the speed follows 60FFh with the ramps of
 //! 6083h and 6084h.
 
-use super::{Cycle, INTERNAL_LIMIT, Outcome, SPEED_ZERO, TARGET_REACHED};
+use super::{Cycle, Demand, INTERNAL_LIMIT, Outcome, SPEED_ZERO, TARGET_REACHED};
 use crate::drive::ramp;
 
 /// Window around the target in which bit 10 is set, rpm.
@@ -17,7 +17,7 @@ pub struct ProfileVelocity {
 
 impl ProfileVelocity {
     /// One control cycle.
-    pub fn step(&mut self, cycle: Cycle<'_>) -> Outcome {
+    pub fn step(&mut self, cycle: &Cycle<'_>) -> Outcome {
         let wanted = cycle.od.rpm(0x60FF, 0);
         let limited = wanted.clamp(-cycle.limits.speed, cycle.limits.speed);
         let target = if cycle.halt() { 0.0 } else { limited };
@@ -39,6 +39,9 @@ impl ProfileVelocity {
         if cycle.measured.standstill {
             bits |= SPEED_ZERO;
         }
-        Outcome { demand, bits }
+        Outcome {
+            bits,
+            ..Outcome::from(Demand::Speed(demand))
+        }
     }
 }

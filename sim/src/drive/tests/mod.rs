@@ -4,6 +4,7 @@ mod boot;
 mod faults;
 mod guarding;
 mod layer;
+mod modes;
 mod motion;
 mod objects;
 mod on_bus;

@@ -210,12 +210,34 @@ impl Rig {
 
     /// Profile velocity, operational, enabled, by SDO.
     pub(super) fn enable(&mut self) {
-        assert_eq!(self.write(0x6060, 0, &[3]), Ok(()));
+        self.enable_in(3);
+    }
+
+    /// The same in another mode.
+    pub(super) fn enable_in(&mut self, mode: u8) {
+        assert_eq!(self.write(0x6060, 0, &[mode]), Ok(()));
         self.nmt(0x01);
         for word in [0x06, 0x07, 0x0F] {
             self.controlword(word);
         }
         assert_eq!(self.state(), crate::drive::cia402::State::OperationEnabled);
+    }
+
+    pub(super) fn write32(&mut self, index: u16, sub: u8, number: i64) {
+        assert_eq!(
+            self.write(index, sub, &(number as u32).to_le_bytes()),
+            Ok(())
+        );
+    }
+
+    /// Bits of the statusword.
+    pub(super) fn bits(&self, mask: u16) -> u16 {
+        self.drive().status().statusword & mask
+    }
+
+    /// 6064h.
+    pub(super) fn position(&self) -> i32 {
+        self.drive().status().position
     }
 
     pub(super) fn target_velocity(&mut self, rpm: i32) {
