@@ -1,6 +1,7 @@
 //! Simulator.
 
 pub mod board;
+pub mod bridge;
 pub mod bus;
 pub mod drive;
 pub mod frame;

@@ -24,6 +24,7 @@ use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 use crate::board::{Board, BoardError, BoardOptions, ResetCause};
+use crate::bridge::Bridge;
 use crate::bus::{BitTiming, Bus, Event, PortId, WireRecord};
 use crate::drive::{Drive, DriveConfig, DriveStatus, cia402};
 use crate::judge::Assignment;
@@ -48,6 +49,10 @@ pub trait Observer {
     fn log(&mut self, at: Time, line: &LogLine);
     /// Called at every look, some thousand times a simulated second.
     fn look(&mut self, world: &World<'_>);
+    /// Whether the run is to end now.
+    fn stop(&self) -> bool {
+        false
+    }
 }
 
 /// Nobody looks.
@@ -76,6 +81,7 @@ pub struct World<'i> {
     /// In the order of the network; `None`: not on the bus.
     stations: Vec<Option<Station>>,
     ports: Vec<String>,
+    bridge: Option<Bridge>,
     agenda: Agenda,
     operator: Operator,
     watch: Watch,
@@ -138,6 +144,7 @@ impl<'i> World<'i> {
             bus,
             stations,
             ports,
+            bridge: None,
             agenda,
             operator,
             watch: Watch::new(moves),
@@ -152,10 +159,19 @@ impl<'i> World<'i> {
         })
     }
 
-    /// Runs to the end of the scenario, or until the firmware has given up and
-    /// everything stands, and judges what was seen.
+    /// The same with a bridge for other tools on the bus. Such a run does not
+    /// end before its time when the firmware gives up.
+    pub fn with_bridge(mut self, mut bridge: Bridge) -> World<'i> {
+        self.ports.extend(bridge.attach(&mut self.bus));
+        self.bridge = Some(bridge);
+        self
+    }
+
+    /// Runs to the end of the scenario, until the observer stops it, or until
+    /// the firmware has given up and everything stands, and judges what was
+    /// seen.
     pub fn run(mut self, observer: &mut dyn Observer) -> Record {
-        while self.now < self.scenario.end && !self.over() {
+        while self.now < self.scenario.end && !self.over() && !observer.stop() {
             self.step(self.scenario.end, observer);
         }
         self.finish()

@@ -88,6 +88,8 @@ impl World<'_> {
                 .find(|station| station.port == event.port)
             {
                 station.drive.on_event(event);
+            } else if let Some(bridge) = &mut self.bridge {
+                bridge.on_event(event);
             }
         }
         if !events.is_empty() {
@@ -108,6 +110,9 @@ impl World<'_> {
                 self.bus.set_timing(station.port, timing, self.now);
             }
             self.bus.offer(station.port, station.drive.offer());
+        }
+        if let Some(bridge) = &mut self.bridge {
+            bridge.offer(&mut self.bus, self.now);
         }
     }
 
@@ -133,6 +138,10 @@ impl World<'_> {
         }
         self.operate();
         observer.look(self);
+        if let Some(bridge) = &mut self.bridge {
+            bridge.exchange(self.now);
+            bridge.offer(&mut self.bus, self.now);
+        }
     }
 
     fn read_log(&mut self, observer: &mut dyn Observer) {
@@ -167,8 +176,10 @@ impl World<'_> {
 
     /// Nothing more is to be expected.
     pub(super) fn over(&self) -> bool {
-        self.complained
-            .is_some_and(|since| self.now >= since + LAST_WORDS)
+        self.bridge.is_none()
+            && self
+                .complained
+                .is_some_and(|since| self.now >= since + LAST_WORDS)
             && self.watch.at_rest()
     }
 }
