@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail};
 
 use crate::cli::{CiOptions, LogLevel, RunOptions, TestOptions};
 use crate::image::{Budget, ImageSize};
-use crate::{cargo, firmware, run, size, toolchain};
+use crate::{cargo, firmware, interop, run, size, toolchain};
 
 /// A name and what is done.
 type Step = (&'static str, fn() -> Result<()>);
@@ -36,13 +36,14 @@ fn tests(args: &[String]) -> Result<()> {
 /// `cargo xtask ci`: everything that has to pass, in the order of how soon it
 /// fails.
 pub(crate) fn command(options: &CiOptions) -> Result<ExitCode> {
-    let steps: [Step; 7] = [
+    let steps: [Step; 8] = [
         ("format", format),
         ("lints, host", lints_host),
         ("lints, board", lints_target),
         (TESTS, || tests(&[])),
         ("sizes", sizes),
         ("one run", one_run),
+        ("other tools", interop::tests),
         ("documentation", documentation),
     ];
     let mut passed: Vec<(&str, Duration)> = Vec::new();
@@ -103,6 +104,7 @@ fn one_run() -> Result<()> {
         without: Vec::new(),
         fault: Vec::new(),
         realtime: false,
+        bridge: None,
         log: LogLevel::Info,
         picture: None,
         json: false,

@@ -9,7 +9,7 @@ use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use crate::run::fault::Fault;
 
 /// The longest run that can be asked for: an hour of virtual time.
-const LONGEST_RUN_S: f64 = 3600.0;
+pub(crate) const LONGEST_RUN_S: f64 = 3600.0;
 
 #[derive(Parser)]
 #[command(
@@ -64,7 +64,10 @@ pub(crate) enum Command {
     Flash,
     /// Show the log of a board that is running already
     Attach,
-    /// Everything that has to pass: format, lints, tests, sizes, a run, docs
+    /// The tests with CANopen tools that are not ours: wants Python 3
+    Interop,
+    /// Everything that has to pass: format, lints, tests, sizes, a run, other
+    /// tools, docs
     Ci(CiOptions),
     /// The long figures: many seeds of 60 simulated seconds each
     Campaign(CampaignOptions),
@@ -89,6 +92,11 @@ pub(crate) struct RunOptions {
     /// Never run ahead of the clock on the wall
     #[arg(long)]
     pub(crate) realtime: bool,
+    /// Let other CANopen tools onto the bus: a server on this computer that
+    /// speaks slcan (0: any free port; the address is printed). Paced by the
+    /// clock; without --seconds until Ctrl-C
+    #[arg(long, value_name = "PORT")]
+    pub(crate) bridge: Option<u16>,
     /// Least severe log lines of the firmware that are shown
     #[arg(long, value_name = "LEVEL", default_value = "info")]
     pub(crate) log: LogLevel,

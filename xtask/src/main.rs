@@ -7,6 +7,7 @@ mod ci;
 mod cli;
 mod firmware;
 mod image;
+mod interop;
 mod report;
 mod run;
 mod size;
@@ -26,6 +27,7 @@ fn main() -> ExitCode {
         Command::Size(options) => size::command(&options),
         Command::Flash => attach::flash(),
         Command::Attach => attach::attach(),
+        Command::Interop => interop::command(),
         Command::Ci(options) => ci::command(&options),
         Command::Campaign(options) => campaign::command(&options),
     };

@@ -18,6 +18,8 @@ fn bad_input_ends_with_usage_and_exit_code_two() {
         &["run", "--without", "128"],
         &["run", "--without", "77"],
         &["run", "--log", "loud"],
+        &["run", "--bridge", "65536"],
+        &["run", "--bridge", "localhost:2000"],
         &["run", "--fault", "3:loud"],
         &["campaign", "--seeds", "0"],
         &["size", "now"],

@@ -1,5 +1,6 @@
 //! `cargo xtask run`: the image on the emulated board, six drives, one table.
 
+mod ctrl_c;
 pub(crate) mod fault;
 mod output;
 mod progress;
@@ -9,11 +10,12 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
+use canmaster_sim::bridge::Bridge;
 use canmaster_sim::judge::Outcome;
 use canmaster_sim::time::Time;
 use canmaster_sim::world::{self, Image, Scenario, World};
 
-use crate::cli::RunOptions;
+use crate::cli::{self, RunOptions};
 use crate::image::ImageSize;
 use crate::{firmware, report};
 use progress::Progress;
@@ -33,9 +35,13 @@ pub(crate) fn command(options: &RunOptions) -> Result<ExitCode> {
     let started = Instant::now();
     let scenario = scenario(options);
     let mut progress = Progress::new(options, scenario.end);
-    let record = World::new(&image, scenario)
-        .context("the emulated board cannot boot this image")?
-        .run(&mut progress);
+    let mut world =
+        World::new(&image, scenario).context("the emulated board cannot boot this image")?;
+    if let Some(port) = options.bridge {
+        world = world.with_bridge(bridge(port)?);
+        progress.stop_on(ctrl_c::handle()?);
+    }
+    let record = world.run(&mut progress);
     progress.finish();
     for complaint in &record.complaints {
         eprintln!("board: {complaint}");
@@ -63,9 +69,11 @@ pub(crate) fn command(options: &RunOptions) -> Result<ExitCode> {
 }
 
 fn scenario(options: &RunOptions) -> Scenario {
-    let end = options
-        .seconds
-        .map_or_else(default_end, Time::from_secs_f64);
+    let end = match options.seconds {
+        Some(seconds) => Time::from_secs_f64(seconds),
+        None if options.bridge.is_some() => Time::from_secs_f64(cli::LONGEST_RUN_S),
+        None => default_end(),
+    };
     let sound = Scenario::new(options.seed, end);
     let complete = options
         .without
@@ -75,6 +83,18 @@ fn scenario(options: &RunOptions) -> Scenario {
         .fault
         .iter()
         .fold(complete, |scenario, fault| fault.apply(scenario))
+}
+
+/// A bridge, and how to use it.
+fn bridge(port: u16) -> Result<Bridge> {
+    let bridge = Bridge::listen(port, world::network().bit_rate).with_context(|| {
+        format!("cannot listen on port {port} of this computer; --bridge 0 takes one that is free")
+    })?;
+    eprintln!(
+        "The bus is open to other tools: interface slcan, channel socket://{}; Ctrl-C ends the run.",
+        bridge.address()
+    );
+    Ok(bridge)
 }
 
 /// Enough for one round trip.

@@ -2,9 +2,12 @@
 //! the firmware's log. All of it on standard error.
 
 use std::io::IsTerminal;
-use std::time::{Duration, Instant};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
 use canmaster::network;
+use canmaster_sim::bridge::Pace;
 use canmaster_sim::bus::RecordKind;
 use canmaster_sim::drive::DriveStatus;
 use canmaster_sim::frame::WireId;
@@ -28,7 +31,10 @@ pub(super) struct Progress {
     /// Without a terminal each new step is a line of its own.
     plain: bool,
     log: LogLevel,
-    pace: Option<Instant>,
+    /// Paced by the clock since then.
+    pace: Option<(Pace, Instant)>,
+    /// The user has had enough.
+    stop: Arc<AtomicBool>,
     next: Time,
     step: &'static str,
     answers: Vec<usize>,
@@ -42,16 +48,23 @@ impl Progress {
         let style = ProgressStyle::with_template("{bar:24} {prefix} {wide_msg}")
             .unwrap_or_else(|_| ProgressStyle::default_bar());
         bar.set_style(style);
+        let paced = options.realtime || options.bridge.is_some();
         Progress {
             bar,
             plain: !std::io::stderr().is_terminal(),
             log: options.log,
-            pace: options.realtime.then(Instant::now),
+            pace: paced.then(|| (Pace::default(), Instant::now())),
+            stop: Arc::default(),
             next: Time::ZERO,
             step: "",
             answers: vec![0; world::network().nodes.len()],
             records_seen: 0,
         }
+    }
+
+    /// Ends the run when `stop` is set.
+    pub(super) fn stop_on(&mut self, stop: Arc<AtomicBool>) {
+        self.stop = stop;
     }
 
     pub(super) fn finish(&self) {
@@ -181,12 +194,15 @@ impl Observer for Progress {
             self.next = world.now() + REFRESH;
             self.show(world);
         }
-        if let Some(started) = self.pace {
-            let due = Duration::from_micros(world.now().as_us());
-            let early = due.saturating_sub(started.elapsed());
+        if let Some((pace, started)) = &mut self.pace {
+            let early = pace.wait(world.now(), started.elapsed());
             if !early.is_zero() {
                 std::thread::sleep(early);
             }
         }
+    }
+
+    fn stop(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
     }
 }
