@@ -53,7 +53,16 @@ class Machine:
         self.reader.start()
 
     def _read(self):
-        self.words.extend(self.process.stderr)
+        for line in self.process.stderr:
+            self.words.append(line)
+
+    def await_words(self, words):
+        """Waits until the run has said so."""
+        until = time.monotonic() + PATIENCE
+        while not any(words in line for line in self.words):
+            if time.monotonic() > until or self.process.poll() is not None:
+                raise RuntimeError(f"no word of `{words}`:\n" + "".join(self.words))
+            time.sleep(0.05)
 
     def stop(self):
         """Ends the run as Ctrl-C does, and returns what it has said."""
@@ -87,6 +96,16 @@ class Machine:
     def socket(self):
         """A plain connection."""
         return socket.create_connection(("127.0.0.1", self.port), PATIENCE)
+
+
+def await_frame(bus, wanted):
+    """The next frame for which `wanted` holds."""
+    until = time.monotonic() + PATIENCE
+    while time.monotonic() < until:
+        message = bus.recv(1.0)
+        if message is not None and wanted(message):
+            return message
+    raise AssertionError("the frame never came")
 
 
 class OnTheBus(unittest.TestCase):
@@ -124,24 +143,11 @@ class OnTheBus(unittest.TestCase):
                 continue
         self.fail(f"node {node.id} never was {state}")
 
-    def await_frame(self, bus, wanted):
-        """The next frame for which `wanted` holds."""
-        until = time.monotonic() + PATIENCE
-        while time.monotonic() < until:
-            message = bus.recv(1.0)
-            if message is not None and wanted(message):
-                return message
-        return self.fail("it never came")
-
     def aborts(self, code, action, *arguments, **named):
         """The server refuses `action` with this abort code."""
         with self.assertRaises(canopen.SdoAbortedError) as refused:
             action(*arguments, **named)
         self.assertEqual(f"{refused.exception.code:08X}", f"{code:08X}")
-
-
-def u16(value):
-    return struct.pack("<H", value)
 
 
 def u32(value):
