@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail};
 
 use crate::cli::{CiOptions, LogLevel, RunOptions, TestOptions};
 use crate::image::{Budget, ImageSize};
-use crate::{cargo, firmware, interop, run, size, toolchain};
+use crate::{cargo, conformance, firmware, interop, run, size, toolchain};
 
 /// A name and what is done.
 type Step = (&'static str, fn() -> Result<()>);
@@ -36,7 +36,7 @@ fn tests(args: &[String]) -> Result<()> {
 /// `cargo xtask ci`: everything that has to pass, in the order of how soon it
 /// fails.
 pub(crate) fn command(options: &CiOptions) -> Result<ExitCode> {
-    let steps: [Step; 8] = [
+    let steps: [Step; 9] = [
         ("format", format),
         ("lints, host", lints_host),
         ("lints, board", lints_target),
@@ -45,6 +45,7 @@ pub(crate) fn command(options: &CiOptions) -> Result<ExitCode> {
         ("one run", one_run),
         ("other tools", interop::tests),
         ("documentation", documentation),
+        ("conformance table", conformance::check),
     ];
     let mut passed: Vec<(&str, Duration)> = Vec::new();
     for (name, step) in steps {

@@ -5,6 +5,7 @@ mod campaign;
 mod cargo;
 mod ci;
 mod cli;
+mod conformance;
 mod firmware;
 mod image;
 mod interop;
