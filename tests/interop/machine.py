@@ -67,7 +67,11 @@ class Machine:
     def stop(self):
         """Ends the run as Ctrl-C does, and returns what it has said."""
         if self.process.poll() is None:
-            self.process.send_signal(signal.SIGINT)
+            if os.name == "nt":
+                # There Ctrl-C goes to whole consoles only.
+                self.process.terminate()
+            else:
+                self.process.send_signal(signal.SIGINT)
         try:
             self.process.wait(PATIENCE)
         except subprocess.TimeoutExpired:
@@ -142,6 +146,16 @@ class OnTheBus(unittest.TestCase):
             except canopen.nmt.NmtError:
                 continue
         self.fail(f"node {node.id} never was {state}")
+
+    def await_emergency(self, node, code):
+        """The node's first emergency with this code since it is known."""
+        until = time.monotonic() + PATIENCE
+        while time.monotonic() < until:
+            for emergency in node.emcy.log:
+                if emergency.code == code:
+                    return emergency
+            time.sleep(0.02)
+        return self.fail(f"node {node.id} sent no EMCY {code:04X}h")
 
     def aborts(self, code, action, *arguments, **named):
         """The server refuses `action` with this abort code."""

@@ -65,9 +65,8 @@ class Drives(OnTheBus):
         self.await_state(drive, "PRE-OPERATIONAL")
         drive.sdo.download(0x1016, 2, struct.pack("<HBB", 200, STRANGER, 0))
         self.network.send_message(0x700 + STRANGER, b"\x05")
-        emergency = drive.emcy.wait(HEARTBEAT_LOST, timeout=PATIENCE)
-        self.assertIsNotNone(emergency, "no EMCY")
-        self.assertEqual(emergency.code, HEARTBEAT_LOST)
+        emergency = self.await_emergency(drive, HEARTBEAT_LOST)
+        self.assertEqual(emergency.register, number(drive.sdo.upload(0x1001, 0)))
 
     def test_a_drive_gets_its_node_id_by_lss(self):
         drive = self.node(6)
