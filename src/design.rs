@@ -9,8 +9,8 @@ pub const AXES: usize = 6;
 /// When the PDO producer goes ahead without the TPDOs that are missing, in
 /// microseconds after the SYNC. Twelve TPDOs take 1.4 ms on the wire at worst
 /// and drives start sending within a millisecond; what is not here after half a
-/// cycle will not come, and the other half is enough for the RPDOs (0.8 ms) with
-/// plenty left for everything else.
+/// cycle will not come, and the other half is enough for the RPDOs (1.5 ms at
+/// worst) with plenty left for everything else.
 pub const TPDO_DEADLINE_US: u16 = 5_000;
 
 /// Cycles in a row without a TPDO after which its drive counts as lost: one may
@@ -26,9 +26,9 @@ pub const WATCHDOG_MS: u32 = 100;
 /// Contacts of this kind bounce for up to 5 ms.
 pub const BUTTON_SAMPLES: u8 = 20;
 
-/// Frames that may wait for a transmit buffer. At worst seven RPDOs of a cycle,
-/// an SDO request or an abort for each of six nodes, an NMT command for each, and
-/// a heartbeat: 20. What is over is reserve.
+/// Frames that may wait for a transmit buffer. At worst the twelve RPDOs of a
+/// cycle in which all ramps change, an SDO request or an abort for each of six
+/// nodes, an NMT command for each, and a heartbeat: 25. What is over is reserve.
 pub const TX_QUEUE: usize = 32;
 
 /// Frames that may wait for a task, plus one that the ring leaves empty. The

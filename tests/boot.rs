@@ -322,3 +322,40 @@ fn two_missing_nodes_are_both_named() {
     assert_eq!(rig.failure(1), (Status::B, Cause::NoBootUp));
     assert_eq!(rig.failure(6), (Status::B, Cause::NoBootUp));
 }
+
+#[test]
+fn a_node_that_resets_when_it_was_configured_is_configured_anew() {
+    let mut rig = Rig::new();
+    rig.fakes[5].no_heartbeat = true;
+    rig.run_for(SIX_EPOS4.master.silence);
+    rig.everybody(BOOT_UP, |_| false);
+    rig.everybody(PRE_OPERATIONAL, |fake| fake.no_heartbeat);
+    let writes = |rig: &Rig| {
+        let written = |f: &&Frame| f.id().get() == 0x602 && f.padded()[0] & 0xE0 == 0x20;
+        rig.sent.iter().filter(written).count()
+    };
+    let once = writes(&rig);
+    rig.error_control(2, BOOT_UP);
+    rig.run();
+    assert_eq!(writes(&rig), 2 * once);
+}
+
+#[test]
+fn a_node_that_resets_while_the_network_starts_fails_it() {
+    let mut rig = Rig::new();
+    rig.fakes[4].never_operational = true;
+    rig.run_for(SIX_EPOS4.master.silence);
+    rig.everybody(BOOT_UP, |_| false);
+    rig.everybody(PRE_OPERATIONAL, |_| false);
+    rig.run_for(Duration::from_millis(20));
+    rig.everybody(OPERATIONAL, |fake| fake.never_operational);
+    rig.error_control(2, BOOT_UP);
+    rig.run();
+    rig.error_control(2, PRE_OPERATIONAL);
+    rig.error_control(5, OPERATIONAL);
+    rig.run();
+    assert!(!rig.boot.is_ready());
+    rig.run_for(Duration::from_millis(2000));
+    assert!(rig.boot.is_failed());
+    assert_eq!(rig.failure(2), (Status::K, Cause::NotOperational));
+}

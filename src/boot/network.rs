@@ -100,12 +100,14 @@ impl<const N: usize> NetworkBoot<N> {
         let Some((function, id)) = frame.id().split() else {
             return;
         };
+        let booting = !self.is_ready() && !self.is_failed();
         let Some(node) = self.nodes.iter_mut().find(|boot| boot.node().id == id) else {
             return;
         };
         match function {
             FunctionCode::SdoResponse => node.on_sdo(frame, now),
-            FunctionCode::ErrorControl => {
+            // Once the network runs, or has failed, it is left to supervision.
+            FunctionCode::ErrorControl if booting => {
                 if let Some(heard) = ErrorControl::decode(frame) {
                     node.on_error_control(heard.state);
                 }
@@ -216,7 +218,8 @@ impl<const N: usize> NetworkBoot<N> {
 
     fn finish_starting(&mut self, deadline: Instant, now: Instant) {
         let waiting = |boot: &NodeBoot| {
-            boot.is_ready() && !boot.is_operational() && boot.node().heartbeat_ms != 0
+            !boot.is_failed()
+                && !(boot.is_ready() && (boot.is_operational() || boot.node().heartbeat_ms == 0))
         };
         if !self.nodes.iter().any(waiting) {
             self.push(Action::Report(Event::NetworkReady));

@@ -131,9 +131,7 @@ impl NodeBoot {
     /// done is gone, so all starts over.
     fn on_boot_up(&mut self) {
         match self.state {
-            State::AwaitBootUp(AwaitBootUp { deadline: None }) | State::Ready | State::Failed => {
-                return;
-            }
+            State::AwaitBootUp(AwaitBootUp { deadline: None }) | State::Failed => return,
             State::AwaitBootUp(_) => {}
             _ => {
                 self.restarts += 1;
@@ -144,6 +142,7 @@ impl NodeBoot {
         }
         self.client.reset();
         self.tries = 0;
+        self.operational = false;
         self.push(Action::Report(Event::BootUp(self.node.id)));
         self.push(Action::Send(
             NodeControl::node(Command::EnterPreOperational, self.node.id).frame(),

@@ -386,9 +386,9 @@ mod app {
 
     /// Error control both ways, emergencies, button, LEDs, and the watchdog.
     ///
-    /// Trigger: TIM7, every millisecond. Budget: 5 000 cycles. If it is late, so is the reaction to a lost node; a
-    /// heartbeat missing for 200 ms stops the drives; after 100 ms without it
-    /// the watchdog resets the board.
+    /// Trigger: TIM7, every millisecond. Budget: 5 000 cycles. If it is late, so is
+    /// the reaction to a lost node; a heartbeat missing for 200 ms stops the
+    /// drives; after 100 ms without it the watchdog resets the board.
     #[task(
         binds = TIM7,
         priority = 2,

@@ -126,6 +126,24 @@ struct Watched {
     consumer: Consumer,
     /// That it is not operational has been reported.
     reported: bool,
+    /// What happened before [`arm`](Supervisor::arm) and has not been put right
+    /// since: a fault as soon as it counts.
+    owed: Option<Notice>,
+}
+
+impl Watched {
+    /// What has to be said of it now.
+    fn poll(&mut self, armed: bool, now: Instant) -> Option<Notice> {
+        if armed && let Some(owed) = self.owed.take() {
+            self.reported |= matches!(owed, Notice::BootUp(_));
+            return Some(owed);
+        }
+        let lost = Notice::HeartbeatLost(self.consumer.poll(now)?);
+        if !armed {
+            self.owed = Some(lost);
+        }
+        Some(lost)
+    }
 }
 
 /// Supervises up to `N` nodes.
@@ -147,6 +165,7 @@ impl<const N: usize> Supervisor<N> {
             Watched {
                 consumer: Consumer::new(node.id, time),
                 reported: false,
+                owed: None,
             }
         });
         Supervisor {
@@ -155,7 +174,9 @@ impl<const N: usize> Supervisor<N> {
         }
     }
 
-    /// The network runs: from now on every node has to stay operational.
+    /// The network runs: from now on every node has to stay operational. One
+    /// that fell silent or was reset before, and was not heard again, is reported
+    /// by the next [`poll`](Self::poll).
     pub fn arm(&mut self) {
         self.armed = true;
     }
@@ -180,11 +201,16 @@ impl<const N: usize> Supervisor<N> {
             .find(|(_, watched)| watched.consumer.node() == node)?;
         let was_lost = watched.consumer.is_lost();
         let heard = watched.consumer.heard(state, now);
-        let notice = if was_lost && armed {
-            // It was reported as lost; whatever it is now cannot be worse.
+        let owed = watched.owed.take();
+        if !armed {
+            watched.owed = matches!(heard, Heard::BootUp { .. }).then_some(Notice::BootUp(node));
+            return None;
+        }
+        let notice = if was_lost && owed.is_none() {
+            // Its loss was a fault already; whatever it is now cannot be worse.
             watched.reported = true;
             Notice::HeartbeatBack(node)
-        } else if !armed || watched.reported {
+        } else if watched.reported {
             return None;
         } else {
             match heard {
@@ -200,12 +226,13 @@ impl<const N: usize> Supervisor<N> {
     /// Looks for heartbeats that stay away: to be called every millisecond,
     /// until it returns `None`.
     pub fn poll(&mut self, now: Instant) -> Option<Report> {
-        let (axis, lost) = self
+        let armed = self.armed;
+        let (axis, notice) = self
             .nodes
             .iter_mut()
             .enumerate()
-            .find_map(|(axis, watched)| Some((axis, watched.consumer.poll(now)?)))?;
-        Some(self.report(Some(axis), Notice::HeartbeatLost(lost)))
+            .find_map(|(axis, watched)| Some((axis, watched.poll(armed, now)?)))?;
+        Some(self.report(Some(axis), notice))
     }
 
     fn report(&self, axis: Option<usize>, notice: Notice) -> Report {
@@ -334,6 +361,36 @@ mod tests {
         let report = supervisor.poll(at(400)).unwrap();
         assert!(matches!(report.notice, Notice::HeartbeatLost(_)));
         assert_eq!(report.fault, None);
+    }
+
+    #[test]
+    fn what_happened_just_before_the_start_counts_from_then_on() {
+        for (last, fault) in [
+            (State::Operational, FaultCause::HeartbeatLost),
+            (State::Initialising, FaultCause::LeftOperational),
+        ] {
+            let mut supervisor = Supervisor::<6>::new(&SIX_EPOS4);
+            supervisor.on_frame(&heartbeat(State::Operational), at(0));
+            supervisor.on_frame(&heartbeat(last), at(100));
+            let early = supervisor.poll(at(400));
+            assert_eq!(early.and_then(|report| report.fault), None);
+            supervisor.arm();
+            let report = supervisor.poll(at(401)).unwrap();
+            assert_eq!((report.axis, report.fault), (Some(2), Some(fault)));
+            assert_eq!(supervisor.poll(at(402)), None);
+        }
+    }
+
+    #[test]
+    fn what_was_put_right_before_the_start_is_forgotten() {
+        let mut supervisor = Supervisor::<6>::new(&SIX_EPOS4);
+        supervisor.on_frame(&heartbeat(State::PreOperational), at(0));
+        assert!(supervisor.poll(at(400)).is_some());
+        supervisor.on_frame(&heartbeat(State::Operational), at(500));
+        supervisor.arm();
+        assert_eq!(supervisor.poll(at(501)), None);
+        let notice = only(&mut supervisor, &heartbeat(State::PreOperational), 600);
+        assert_eq!(notice.fault(), Some(FaultCause::LeftOperational));
     }
 
     #[test]

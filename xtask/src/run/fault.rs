@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use canmaster::NodeId;
+use canmaster::{NodeId, network};
 use canmaster_sim::world::{Ailment, Scenario};
 
 /// `NODE:identity`, `NODE:refuse=INDEX[:SUB]`, `NODE:silent`.
@@ -32,15 +32,30 @@ impl FromStr for Fault {
             None if what == "silent" => Ailment::SilentInMotion,
             Some(("refuse", object)) => {
                 let (index, sub) = object.split_once(':').unwrap_or((object, "0"));
-                Ailment::RefusesWrite {
-                    index: u16::from_str_radix(index, 16).map_err(|_| HELP)?,
-                    sub: u8::from_str_radix(sub, 16).map_err(|_| HELP)?,
+                let index = u16::from_str_radix(index, 16).map_err(|_| HELP)?;
+                let sub = u8::from_str_radix(sub, 16).map_err(|_| HELP)?;
+                if !is_written(node, index, sub) {
+                    return Err(format!(
+                        "the configuration does not write {index:04X}h:{sub:02X}, so it cannot be refused"
+                    ));
                 }
+                Ailment::RefusesWrite { index, sub }
             }
             _ => return Err(HELP.into()),
         };
         Ok(Fault { node, ailment })
     }
+}
+
+/// Whether the master's configuration of `node` writes this object.
+fn is_written(node: NodeId, index: u16, sub: u8) -> bool {
+    let network = canmaster_sim::world::network();
+    network
+        .nodes
+        .iter()
+        .filter(|known| known.id == node)
+        .flat_map(|known| network::plan(network, known))
+        .any(|write| (write.at.index.0, write.at.sub.0) == (index, sub))
 }
 
 #[cfg(test)]
@@ -55,7 +70,7 @@ mod tests {
         assert_eq!(read("3:identity"), fault(Ailment::WrongIdentity));
         assert_eq!(read("3:silent"), fault(Ailment::SilentInMotion));
         let refuses = |index, sub| fault(Ailment::RefusesWrite { index, sub });
-        assert_eq!(read("3:refuse=6083"), refuses(0x6083, 0));
+        assert_eq!(read("3:refuse=6085"), refuses(0x6085, 0));
         assert_eq!(read("3:refuse=1016:1"), refuses(0x1016, 1));
         for bad in [
             "",
@@ -65,6 +80,8 @@ mod tests {
             "3:refuse",
             "3:refuse=xyz",
             "3:refuse=10000",
+            "3:refuse=1000",
+            "3:refuse=60C2",
             "identity",
         ] {
             assert!(read(bad).is_err(), "{bad}");
