@@ -25,6 +25,9 @@ pub(super) struct Axis {
     servo: Servo,
     modes: Modes,
     mode: Mode,
+    mode_sticks: bool,
+    /// The last one that acted.
+    controlword: u16,
     mode_bits: u16,
     /// rpm; meaningless while the power stage is off.
     demand: f64,
@@ -46,6 +49,8 @@ impl Axis {
             servo,
             modes: Modes::default(),
             mode: Mode::ProfilePosition,
+            mode_sticks: false,
+            controlword: 0,
             mode_bits: 0,
             demand: 0.0,
             target: None,
@@ -59,6 +64,7 @@ impl Axis {
     pub(super) fn power_on_reset(&mut self) {
         self.machine = Machine::new();
         self.modes = Modes::default();
+        self.controlword = 0;
         self.mode_bits = 0;
         self.target = None;
         self.shift = 0;
@@ -91,15 +97,16 @@ impl Axis {
     }
 
     /// A controlword was written. True if a fault was reset.
-    pub(super) fn control(&mut self, od: &Dictionary) -> bool {
-        self.modes.control(od, self.servo.per_rpm());
+    pub(super) fn control(&mut self, controlword: u16, od: &Dictionary) -> bool {
+        self.controlword = controlword;
+        self.modes.control(controlword, od, self.servo.per_rpm());
         self.command(od)
     }
 
     fn command(&mut self, od: &Dictionary) -> bool {
-        let controlword = od.number(0x6040, 0) as u16;
         let may_reset = od.errors.may_reset();
-        self.machine.control(controlword, options(od), may_reset)
+        self.machine
+            .control(self.controlword, options(od), may_reset)
     }
 
     /// An error occurred.
@@ -110,6 +117,11 @@ impl Axis {
     /// A set value was written.
     pub(super) fn set(&mut self, index: u16, od: &Dictionary, now_s: f64) {
         self.modes.set(index, od, now_s);
+    }
+
+    /// From now on 6061h stays as it is.
+    pub(super) fn stick_mode(&mut self) {
+        self.mode_sticks = true;
     }
 
     /// Another load on the shaft, per mille of rated torque.
@@ -148,7 +160,9 @@ impl Axis {
             speed_rpm: od.number(0x30E0, 1) as f64,
             window_s: od.number(0x30E0, 2) as f64 / 1000.0,
         };
-        if let Some(mode) = Mode::from_code(od.number(0x6060, 0) as i8) {
+        if let Some(mode) = Mode::from_code(od.number(0x6060, 0) as i8)
+            && !self.mode_sticks
+        {
             self.mode = mode;
         }
         let (follow, error) = self.follow(od, own_s, now_s);
@@ -190,6 +204,7 @@ impl Axis {
             }
             Power::Run => self.run(&Cycle {
                 od,
+                controlword: self.controlword,
                 limits,
                 measured,
                 position: measured.count + self.shift,

@@ -1,5 +1,6 @@
 //! What one simulated drive is like, and what is wrong with it.
 
+use super::mangle::SdoWrong;
 use super::plant::PlantConfig;
 use super::random::{self, Random};
 use super::servo::ServoConfig;
@@ -178,6 +179,20 @@ pub enum DriveFault {
     SdoLatency(Spread),
     /// From then on it answers no SDO request.
     SdoDead {
+        /// Since when.
+        at: Time,
+    },
+    /// Its SDO answers are wrong.
+    SdoWrong(SdoWrong),
+    /// From then on controlwords change nothing: no transition is confirmed.
+    ControlwordIgnored {
+        /// Since when.
+        at: Time,
+    },
+    /// Controlwords act this much later.
+    ControlwordLate(Spread),
+    /// From then on 6061h does not follow 6060h.
+    ModeStuck {
         /// Since when.
         at: Time,
     },

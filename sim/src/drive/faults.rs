@@ -57,8 +57,12 @@ impl Drive {
                     self.plan_always(until, Job::CauseGone(code));
                 }
             }
-            // Looked at whenever there is something to send.
+            DriveFault::ControlwordLate(delay) => self.control_delay = Some(delay),
+            DriveFault::ModeStuck { at } => self.plan_always(at, Job::StickMode),
+            // Looked at whenever there is something to do.
             DriveFault::SdoDead { .. }
+            | DriveFault::SdoWrong(_)
+            | DriveFault::ControlwordIgnored { .. }
             | DriveFault::HeartbeatLost { .. }
             | DriveFault::TpdosLost { .. } => {}
         }

@@ -1,5 +1,6 @@
 //! Power-on, resets and the way back (CiA 301, 7.3.2.2.1).
 
+use super::config::DriveFault;
 use super::guarding::Guarding;
 use super::network::Watch;
 use super::service::SdoService;
@@ -144,7 +145,26 @@ impl Drive {
 
     /// 6040h was written.
     pub(super) fn on_controlword(&mut self) {
-        if self.axis.control(&self.od) && self.od.errors.reset() {
+        let since = |fault: &DriveFault| match *fault {
+            DriveFault::ControlwordIgnored { at } => self.now >= at,
+            _ => false,
+        };
+        if self.config.faults.iter().any(since) {
+            return;
+        }
+        let word = self.od.number(0x6040, 0) as u16;
+        match self.control_delay {
+            Some(delay) => {
+                let us = delay.draw(&mut self.random);
+                self.plan(self.now + self.clock.span(us), Job::Control(word));
+            }
+            None => self.control(word),
+        }
+    }
+
+    /// A controlword acts.
+    pub(super) fn control(&mut self, word: u16) {
+        if self.axis.control(word, &self.od) && self.od.errors.reset() {
             self.send_emcy(0);
         }
     }

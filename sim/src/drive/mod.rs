@@ -26,6 +26,7 @@ mod faults;
 mod guarding;
 mod layer;
 mod life;
+mod mangle;
 pub mod modes;
 mod network;
 pub mod objects;
@@ -44,6 +45,7 @@ mod tests;
 pub mod travel;
 
 pub use config::{DriveConfig, DriveFault, Identity, Spread};
+pub use mangle::SdoWrong;
 pub use plant::PlantState;
 pub use status::{DriveStatus, Sample};
 
@@ -89,6 +91,10 @@ enum Job {
     SpeakAgain,
     /// The pause after bus-off is over.
     BusOffOver,
+    /// A controlword acts, late.
+    Control(u16),
+    /// The mode stays from now on.
+    StickMode,
     /// Another load on the shaft, per mille of rated torque.
     Load(i32),
     /// An error of the configuration occurs.
@@ -122,6 +128,7 @@ pub struct Drive {
     guarding: Guarding,
     /// bit/s, in use.
     bit_rate: u32,
+    control_delay: Option<Spread>,
     bus_off: bool,
     controller: Controller,
     od: Dictionary,
@@ -157,6 +164,7 @@ impl Drive {
             lss: layer::slave(config.identity, node),
             guarding: Guarding::default(),
             bit_rate: config.bit_rate,
+            control_delay: None,
             bus_off: false,
             controller: Controller::default(),
             od,
@@ -276,6 +284,8 @@ impl Drive {
             Job::SwitchBitRate => self.switch_bit_rate(),
             Job::SpeakAgain => self.speak_again(),
             Job::BusOffOver => self.bus_off_over(),
+            Job::Control(word) => self.control(word),
+            Job::StickMode => self.axis.stick_mode(),
             Job::Load(permille) => self.axis.set_load(permille.into()),
             Job::Error { code, lasting } => self.raise(code, lasting),
             Job::CauseGone(code) => self.cause_gone(code),

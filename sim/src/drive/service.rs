@@ -3,6 +3,7 @@
 
 use super::config::DriveFault;
 use super::dictionary::Dictionary;
+use super::mangle::Answer;
 use super::objects::PDOS;
 use super::{Drive, Job, errors};
 use crate::frame::WireId;
@@ -72,7 +73,7 @@ impl Drive {
             return;
         }
         if self.service.segments {
-            if let Some(answer) = self.work(frame) {
+            if let Some(answer) = self.work(frame).and_then(|a| self.mangled(a, false)) {
                 let at = self.now + self.latency();
                 self.plan(at, Job::Answer(answer));
             }
@@ -108,7 +109,7 @@ impl Drive {
         let Some(frame) = self.service.waiting.pop_front() else {
             return;
         };
-        if let Some(answer) = self.work(&frame) {
+        if let Some(answer) = self.work(&frame).and_then(|a| self.mangled(a, false)) {
             self.transmit(answer);
         }
         if !self.service.waiting.is_empty() {
@@ -139,10 +140,28 @@ impl Drive {
         if self.answer_fits()
             && let Some(frame) = self.service.server.poll(now, &mut self.od)
         {
-            self.transmit(frame);
+            let block_segment = !self.service.segments && frame.padded()[0] != ABORT;
+            if let Some(frame) = self.mangled(frame, block_segment) {
+                self.transmit(frame);
+            }
         }
         if self.service.server.is_idle() {
             self.service.segments = false;
+        }
+    }
+
+    /// An answer as the faults of the drive leave it.
+    fn mangled(&self, frame: Frame, block_segment: bool) -> Option<Frame> {
+        let wrong = self.config.faults.iter().find_map(|fault| match fault {
+            DriveFault::SdoWrong(wrong) => Some(*wrong),
+            _ => None,
+        });
+        match wrong {
+            Some(wrong) => wrong.mangle(Answer {
+                frame,
+                block_segment,
+            }),
+            None => Some(frame),
         }
     }
 

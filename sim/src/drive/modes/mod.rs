@@ -148,6 +148,8 @@ fn period_s(od: &Dictionary) -> f64 {
 pub struct Cycle<'a> {
     /// Set values.
     pub od: &'a Dictionary,
+    /// The controlword that acts.
+    pub controlword: u16,
     /// Limits.
     pub limits: Limits,
     /// What the drive measured.
@@ -172,7 +174,7 @@ pub struct Cycle<'a> {
 
 impl Cycle<'_> {
     fn halt(&self) -> bool {
-        self.od.number(0x6040, 0) as u16 & HALT != 0
+        self.controlword & HALT != 0
     }
 }
 
@@ -266,8 +268,7 @@ impl Modes {
 
     /// A controlword was written. Set-points and homing are started in the mode
     /// that has the axis.
-    pub fn control(&mut self, od: &Dictionary, per_rpm: f64) {
-        let controlword = od.number(0x6040, 0) as u16;
+    pub fn control(&mut self, controlword: u16, od: &Dictionary, per_rpm: f64) {
         let active = |mode| self.active == Some(mode);
         let (position, homing) = (active(Mode::ProfilePosition), active(Mode::Homing));
         self.profile_position

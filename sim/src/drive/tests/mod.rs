@@ -4,6 +4,7 @@ mod boot;
 mod faults;
 mod guarding;
 mod layer;
+mod mangled;
 mod modes;
 mod motion;
 mod objects;
