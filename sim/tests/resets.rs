@@ -20,7 +20,13 @@ fn resets_of_a_millisecond_and_of_two_seconds_end_in_standstill() {
 
 #[test]
 fn a_task_that_hangs_is_found_by_the_watchdog() {
-    for (seed, irq) in [(13, irqs::TIM7), (14, irqs::TIM3), (16, irqs::FDCAN1_IT0)] {
+    for (seed, irq) in [
+        (13, irqs::TIM7),
+        (14, irqs::TIM3),
+        (16, irqs::FDCAN1_IT0),
+        (17, irqs::TIM2),
+        (18, irqs::UART4),
+    ] {
         hang_in_motion(image(), seed, irq).unwrap_or_else(|error| panic!("{irq}: {error}"));
     }
 }

@@ -65,6 +65,8 @@ pub mod irqs {
     pub const TIM3: u8 = 29;
     /// TIM5: the free-running clock.
     pub const TIM5: u8 = 50;
+    /// UART4: dispatches the firmware's software task.
+    pub const UART4: u8 = 52;
     /// TIM7: the network tick.
     pub const TIM7: u8 = 55;
 }

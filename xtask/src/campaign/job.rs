@@ -9,7 +9,13 @@ use canmaster_sim::world::{Image, Record, Scenario, World, trials};
 use serde::Serialize;
 
 /// The interrupts whose tasks are made to hang, in turn.
-const HANGS: [u8; 4] = [irqs::FDCAN1_IT0, irqs::TIM2, irqs::TIM3, irqs::TIM7];
+const HANGS: [u8; 5] = [
+    irqs::FDCAN1_IT0,
+    irqs::TIM2,
+    irqs::TIM3,
+    irqs::TIM7,
+    irqs::UART4,
+];
 /// How long the board is held in reset, in turn, milliseconds.
 const RESETS_MS: [u64; 8] = [1, 5, 20, 100, 250, 500, 1000, 2000];
 /// How long the axes have been in motion by then, in turn, milliseconds.
