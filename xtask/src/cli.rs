@@ -85,7 +85,7 @@ pub(crate) struct RunOptions {
     /// Leave this drive off the bus; may be repeated
     #[arg(long, value_name = "NODE", value_parser = node)]
     pub(crate) without: Vec<NodeId>,
-    /// Give a drive a fault: NODE:identity, NODE:refuse=INDEX[:SUB] (hex),
+    /// Give a drive a fault: NODE:identity, NODE:refuse=INDEX:SUB (hex),
     /// NODE:silent (in motion); may be repeated
     #[arg(long, value_name = "FAULT")]
     pub(crate) fault: Vec<Fault>,

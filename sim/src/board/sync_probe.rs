@@ -13,7 +13,7 @@ pub(crate) struct SyncProbe {
     figures: SyncFigures,
 }
 
-/// What the [`SyncProbe`] has seen, in core cycles.
+/// What the probe has seen, in core cycles.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct SyncFigures {
     /// Updates after which a SYNC was requested.

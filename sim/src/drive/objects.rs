@@ -2,7 +2,7 @@
 //! after a reset (EPOS4 Firmware Specification; firmware 0170h).
 //!
 //! Values that depend on the node-ID are put in by
-//! [`dictionary`](super::dictionary).
+//! `dictionary`.
 
 use canmaster::od::DataType::{
     Domain, Integer8, Integer16, Integer32, Unsigned8, Unsigned16, Unsigned32,
