@@ -146,7 +146,7 @@ impl fmt::Display for CobId {
 /// (CiA 301, 7.3.5). RPDO and TPDO are seen from the node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[allow(missing_docs)]
+#[expect(missing_docs, reason = "the names are those of the standard")]
 pub enum FunctionCode {
     Emcy,
     Tpdo1,

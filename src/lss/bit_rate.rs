@@ -3,7 +3,7 @@
 /// A bit rate of the standard table, table selector 0. Unknown indices survive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[allow(missing_docs)]
+#[expect(missing_docs, reason = "the names say it")]
 pub enum BitRate {
     Kbit1000,
     Kbit800,

@@ -22,7 +22,7 @@ pub enum State {
 /// A communication service whose use depends on the NMT state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[allow(missing_docs)]
+#[expect(missing_docs, reason = "the names are those of the standard")]
 pub enum Service {
     Pdo,
     Sdo,

@@ -8,7 +8,7 @@ pub const VALUE_MAX: usize = 8;
 /// A data type (CiA 301, 7.4.7.1, table 44).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[allow(missing_docs)]
+#[expect(missing_docs, reason = "the names are those of the standard")]
 pub enum DataType {
     Boolean,
     Integer8,

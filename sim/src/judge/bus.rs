@@ -87,13 +87,13 @@ impl Seen {
     }
 }
 
-/// Judges what was on the wire against what should have been.
-pub fn judge(records: &[WireRecord], traffic: &Traffic) -> BusFigures {
+/// Judges what was on the wire until `end` against what should have been.
+pub fn judge(records: &[WireRecord], traffic: &Traffic, end: Time) -> BusFigures {
     let mut judge = Judge::new(traffic);
     for record in records {
         judge.record(record);
     }
-    judge.finish()
+    judge.finish(end)
 }
 
 struct Judge<'t> {
@@ -243,7 +243,13 @@ impl<'t> Judge<'t> {
         }
     }
 
-    fn finish(mut self) -> BusFigures {
+    fn finish(mut self, end: Time) -> BusFigures {
+        if let Some(last) = self.interval_start {
+            // The SYNCs that did not come any more; half a cycle late is not yet
+            // missing.
+            let overdue = end.since(last).as_us_f64() / self.cycle_us - 0.5;
+            self.figures.missed += overdue.max(0.0) as usize;
+        }
         self.end_grid();
         self.figures.load_mean = self.load(self.bits, self.cycles);
         self.figures

@@ -57,6 +57,12 @@ fn whole_cycle(us: u64) -> Vec<WireRecord> {
     records
 }
 
+/// The run ends with its last frame.
+fn judge(records: &[WireRecord], traffic: &Traffic) -> BusFigures {
+    let end = records.last().map_or(Time::ZERO, |record| record.end);
+    super::judge(records, traffic, end)
+}
+
 /// NMT start, then `cycles` whole cycles and the SYNC that closes the last.
 fn running(cycles: u64) -> Vec<WireRecord> {
     let mut records = vec![record(100, 60, 0x000, &[0x01, 0x00])];
@@ -122,6 +128,15 @@ fn a_missing_sync_is_missed_and_does_not_bend_the_grid() {
         "{}",
         figures.load_max
     );
+}
+
+#[test]
+fn syncs_that_stop_for_good_are_missed_until_the_end() {
+    let last = Time::from_us(1000 + 10 * CYCLE_US);
+    for (cycles, missed) in [(1, 0), (2, 1), (7, 6)] {
+        let end = last + Time::from_us(cycles * CYCLE_US);
+        assert_eq!(super::judge(&running(10), &six(), end).missed, missed);
+    }
 }
 
 #[test]

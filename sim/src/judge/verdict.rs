@@ -11,6 +11,9 @@ use super::bus::BusFigures;
 /// How far from its target an axis may come to rest, increments.
 pub const ARRIVAL_TOLERANCE: i64 = 5;
 
+/// How long interrupts may be off at a time, cycles: SYNC must not wait.
+pub const IRQ_OFF_LIMIT: u64 = 120;
+
 /// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
@@ -55,6 +58,8 @@ pub struct Evidence<'e> {
     pub arrivals: &'e [Arrival],
     /// What was on the bus.
     pub bus: &'e BusFigures,
+    /// The longest section with interrupts off, cycles.
+    pub irq_off_cycles: u64,
     /// The firmware's first complaint.
     pub error_line: Option<&'e str>,
     /// The emulated board's first complaint about the firmware.
@@ -106,6 +111,12 @@ fn failure(evidence: &Evidence<'_>) -> Option<String> {
                 format!(
                     "{missed} cycles were missed: a SYNC, RPDO1 or TPDO1 was absent; see bus.log"
                 )
+            })
+        })
+        .or_else(|| {
+            let cycles = evidence.irq_off_cycles;
+            (cycles > IRQ_OFF_LIMIT).then(|| {
+                format!("interrupts were off for {cycles} cycles (allowed: {IRQ_OFF_LIMIT})")
             })
         })
 }
@@ -189,6 +200,7 @@ mod tests {
         arrivals: Vec<Arrival>,
         releases: Vec<Release>,
         bus: BusFigures,
+        irq_off_cycles: u64,
         error_line: Option<&'static str>,
     }
 
@@ -234,6 +246,7 @@ mod tests {
                 revoked: false,
             }],
             bus: BusFigures::default(),
+            irq_off_cycles: IRQ_OFF_LIMIT,
             error_line: None,
         }
     }
@@ -249,6 +262,7 @@ mod tests {
             releases: &case.releases,
             arrivals: &case.arrivals,
             bus: &case.bus,
+            irq_off_cycles: case.irq_off_cycles,
             error_line: case.error_line,
             board_complaint: None,
             unfinished: "too short",
@@ -289,6 +303,10 @@ mod tests {
         let mut case = good();
         case.bus.missed = 2;
         fails(&case, "2 cycles were missed");
+
+        let mut case = good();
+        case.irq_off_cycles = IRQ_OFF_LIMIT + 1;
+        fails(&case, "interrupts were off for 121 cycles");
 
         let mut case = good();
         case.axes[0] = AxisMonitor::default();

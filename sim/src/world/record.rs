@@ -75,7 +75,7 @@ impl Seen {
     pub(super) fn judge(self, assignment: &Assignment, traffic: &Traffic) -> Record {
         let nodes: Vec<NodeId> = self.axes.iter().map(|axis| axis.node).collect();
         let motion: Vec<AxisMonitor> = self.axes.iter().map(|axis| axis.motion.clone()).collect();
-        let figures = bus::judge(&self.wire, traffic);
+        let figures = bus::judge(&self.wire, traffic, self.simulated);
         let arrived = arrivals(&nodes, &motion, assignment, &self.releases);
         let error_line = first_error(&self.log).map(|line| line.message.as_str());
         let verdict = verdict(&Evidence {
@@ -85,6 +85,7 @@ impl Seen {
             releases: &self.releases,
             arrivals: &arrived,
             bus: &figures,
+            irq_off_cycles: self.board.irq_off_max_cycles,
             error_line,
             board_complaint: self.complaints.first().map(String::as_str),
             unfinished: &self.unfinished,

@@ -121,8 +121,13 @@ impl Job {
         let world = World::new(image, Scenario::new(self.seed, end)).map_err(words)?;
         let record = world.run(&mut ());
         let wall_s = started.elapsed().as_secs_f64();
-        *figures = Some(Figures::of(&record, wall_s));
+        let measured = Figures::of(&record, wall_s);
+        let speed = measured.times_real_time;
+        *figures = Some(measured);
         match record.verdict.outcome {
+            Outcome::Ok if speed < 1.0 => Err(format!(
+                "the emulation was slower than real time: {speed:.2} times"
+            )),
             Outcome::Ok => Ok(()),
             outcome => Err(format!("{outcome}: {}", record.verdict.reason)),
         }
