@@ -12,6 +12,9 @@ use crate::{cargo, conformance, firmware, interop, run, size, toolchain};
 /// A name and what is done.
 type Step = (&'static str, fn() -> Result<()>);
 
+/// The crate that exists for the target only.
+const BOARD_CRATE: &str = "nucleo-g474re";
+
 /// Name of the step that runs them.
 const TESTS: &str = "tests";
 
@@ -117,16 +120,22 @@ fn one_run() -> Result<()> {
 }
 
 fn documentation() -> Result<()> {
-    cargo::run(
-        cargo::cargo()
-            .args([
-                "doc",
-                "--workspace",
-                "--no-deps",
-                "--profile",
-                "host",
-                "--locked",
-            ])
-            .env("RUSTDOCFLAGS", "-D warnings"),
-    )
+    let mut host = cargo::cargo();
+    host.args(["doc", "--workspace", "--exclude", BOARD_CRATE])
+        .args(["--no-deps", "--profile", "host", "--locked"]);
+    // There is nothing of it on the host.
+    let mut board = cargo::cargo();
+    board
+        .args([
+            "doc",
+            "--package",
+            BOARD_CRATE,
+            "--target",
+            toolchain::TARGET,
+        ])
+        .args(["--no-deps", "--release", "--locked"]);
+    for command in [&mut host, &mut board] {
+        cargo::run(command.env("RUSTDOCFLAGS", "-D warnings"))?;
+    }
+    Ok(())
 }
