@@ -44,6 +44,8 @@ pub mod sync;
 pub mod time;
 pub mod time_of_day;
 
+mod words;
+
 pub use frame::Frame;
 pub use id::{CobId, Index, NodeId, SubIndex};
 pub use time::{Duration, Instant};

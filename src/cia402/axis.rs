@@ -1,9 +1,8 @@
 //! The commanding side of the state machine of one drive (CiA 402-2, 8.3).
 
-use core::fmt;
-
 use super::{Command, ControlWord, State, StatusWord};
 use crate::time::{Duration, Instant};
+use crate::words::in_words;
 
 /// Time after which a fault reset that changed nothing is tried with a new
 /// edge: a drive may still be leaving its fault reaction when the first comes.
@@ -11,7 +10,6 @@ const RESET_RETRY: Duration = Duration::from_millis(200);
 
 /// Where the drive's state machine shall go.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Goal {
     /// Switch on disabled: the power stage off, faults reset.
     Disabled,
@@ -65,21 +63,16 @@ impl Goal {
     }
 }
 
-impl fmt::Display for Goal {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Goal::Disabled => "switch on disabled",
-            Goal::Ready => "ready to switch on",
-            Goal::SwitchedOn => "switched on",
-            Goal::Enabled => "operation enabled",
-            Goal::QuickStop => "quick stop",
-        })
-    }
-}
+in_words!(Goal {
+    Goal::Disabled => ("switch on disabled"),
+    Goal::Ready => ("ready to switch on"),
+    Goal::SwitchedOn => ("switched on"),
+    Goal::Enabled => ("operation enabled"),
+    Goal::QuickStop => ("quick stop"),
+});
 
 /// A drive did not reach its goal in time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Timeout {
     /// The last state heard since the goal was set; `None` if none was heard.
     pub state: Option<State>,
@@ -87,14 +80,10 @@ pub struct Timeout {
     pub goal: Goal,
 }
 
-impl fmt::Display for Timeout {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.state {
-            Some(state) => write!(f, "stayed in \"{state}\" instead of \"{}\"", self.goal),
-            None => write!(f, "no statusword while waiting for \"{}\"", self.goal),
-        }
-    }
-}
+in_words!(Timeout {
+    Timeout { state: Some(state), goal } => ("stayed in \"{}\" instead of \"{}\"", state, goal),
+    Timeout { state: None, goal } => ("no statusword while waiting for \"{}\"", goal),
+});
 
 impl core::error::Error for Timeout {}
 

@@ -1,6 +1,6 @@
 //! The statusword, object 6041h (CiA 402-2, 8.4.2).
 
-use core::fmt;
+use crate::words::in_words;
 
 /// States whose code has bit 5 undefined are told apart by these bits.
 const MASK_WITHOUT_QUICK_STOP: u16 = 0x004F;
@@ -10,7 +10,6 @@ const MASK_STATE: u16 = 0x006F;
 /// State of the power drive system's state machine (CiA 402-2, 8.3, table of
 /// state coding).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum State {
     /// The drive initialises itself.
@@ -63,21 +62,17 @@ impl State {
     }
 }
 
-impl fmt::Display for State {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            State::NotReadyToSwitchOn => f.write_str("not ready to switch on"),
-            State::SwitchOnDisabled => f.write_str("switch on disabled"),
-            State::ReadyToSwitchOn => f.write_str("ready to switch on"),
-            State::SwitchedOn => f.write_str("switched on"),
-            State::OperationEnabled => f.write_str("operation enabled"),
-            State::QuickStopActive => f.write_str("quick stop active"),
-            State::FaultReactionActive => f.write_str("fault reaction active"),
-            State::Fault => f.write_str("fault"),
-            State::Other(bits) => write!(f, "undefined state bits {bits:#04x}"),
-        }
-    }
-}
+in_words!(State {
+    State::NotReadyToSwitchOn => ("not ready to switch on"),
+    State::SwitchOnDisabled => ("switch on disabled"),
+    State::ReadyToSwitchOn => ("ready to switch on"),
+    State::SwitchedOn => ("switched on"),
+    State::OperationEnabled => ("operation enabled"),
+    State::QuickStopActive => ("quick stop active"),
+    State::FaultReactionActive => ("fault reaction active"),
+    State::Fault => ("fault"),
+    State::Other(bits) => ("undefined state bits {:#04x}", bits),
+});
 
 /// The statusword, object 6041h. Any value is kept as it came.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

@@ -4,7 +4,6 @@ use core::fmt;
 
 /// The error register, object 1001h (CiA 301, 7.5.2.2).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ErrorRegister(pub u8);
 
 impl ErrorRegister {
@@ -60,5 +59,52 @@ impl fmt::Display for ErrorRegister {
             write!(f, "{separator}{name}")?;
         }
         Ok(())
+    }
+}
+
+#[cfg(feature = "defmt")]
+impl defmt::Format for ErrorRegister {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        if self.0 == 0 {
+            defmt::write!(f, "no error");
+        } else {
+            defmt::write!(f, "{}", BitsFrom(self.0, 0));
+        }
+    }
+}
+
+/// The set bits of a register from the one with this number on.
+#[cfg(feature = "defmt")]
+struct BitsFrom(u8, u8);
+
+#[cfg(feature = "defmt")]
+impl defmt::Format for BitsFrom {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        let BitsFrom(register, first) = *self;
+        let Some(bit) = (first..8).find(|bit| register & (1 << bit) != 0) else {
+            return defmt::write!(f, "");
+        };
+        let name = match bit {
+            0 => defmt::intern!("generic"),
+            1 => defmt::intern!("current"),
+            2 => defmt::intern!("voltage"),
+            3 => defmt::intern!("temperature"),
+            4 => defmt::intern!("communication"),
+            5 => defmt::intern!("device profile"),
+            6 => defmt::intern!("reserved"),
+            _ => defmt::intern!("manufacturer"),
+        };
+        let separator = if register & ((1 << bit) - 1) == 0 {
+            defmt::intern!("")
+        } else {
+            defmt::intern!(", ")
+        };
+        defmt::write!(
+            f,
+            "{=istr}{=istr}{}",
+            separator,
+            name,
+            BitsFrom(register, bit + 1)
+        );
     }
 }

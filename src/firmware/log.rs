@@ -10,13 +10,24 @@ use canmaster::{
     network::Network,
 };
 use core::sync::atomic::{AtomicU32, Ordering};
-use defmt::{Display2Format, error, info, warn};
+use defmt::{error, info, warn};
 use nucleo_g474re::can::ErrorState;
 
 /// Milliseconds since the start, for the log; `network` counts them.
 pub(crate) static UPTIME_MS: AtomicU32 = AtomicU32::new(0);
 
 defmt::timestamp!("{=u32:ms}", UPTIME_MS.load(Ordering::Relaxed));
+
+/// The first fault is an error, what follows from it a warning.
+macro_rules! fault {
+    ($log:expr, $($words:tt)+) => {
+        if core::mem::replace(&mut $log.faulted, true) {
+            warn!($($words)+);
+        } else {
+            error!($($words)+);
+        }
+    };
+}
 
 /// What `network` has to say.
 #[derive(Clone, Copy)]
@@ -56,11 +67,14 @@ impl Log {
     pub(crate) fn news(&mut self, news: &News) {
         match news {
             News::Node(report) => self.report(report),
-            News::ErrorState(ErrorState::BusOff) => self.fault(format_args!(
+            News::ErrorState(ErrorState::BusOff) => fault!(
+                self,
                 "CAN controller bus-off: check CAN_H and CAN_L for a short or exchanged wires, the termination, and the bit rate of every node; then reset the board"
-            )),
+            ),
             News::ErrorState(ErrorState::Passive) => {
-                warn!("CAN controller error passive: is any other node on the bus, and the bus terminated?");
+                warn!(
+                    "CAN controller error passive: is any other node on the bus, and the bus terminated?"
+                );
             }
             News::ErrorState(ErrorState::Warning) => {
                 warn!("CAN error counter at the warning limit: check wiring and termination");
@@ -87,24 +101,12 @@ impl Log {
             fault,
         } = report;
         if axis.is_none() {
-            warn!(
-                "{}: it is not in the network description",
-                Display2Format(notice)
-            );
+            warn!("{}: it is not in the network description", notice);
         } else if fault.is_some() {
-            self.fault(format_args!("{notice}; {}", notice.advice()));
+            fault!(self, "{}; {}", notice, notice.advice());
         } else {
-            warn!("{}", Display2Format(notice));
+            warn!("{}", notice);
         }
-    }
-
-    fn fault(&mut self, words: core::fmt::Arguments<'_>) {
-        if self.faulted {
-            warn!("{}", Display2Format(&words));
-        } else {
-            error!("{}", Display2Format(&words));
-        }
-        self.faulted = true;
     }
 
     /// What the group reports.
@@ -115,36 +117,39 @@ impl Log {
                 cause: FaultCause::NetworkLost,
                 ..
             } => {
-                warn!("{}", Display2Format(event));
+                warn!("{}", event);
             }
             GroupEvent::Fault {
                 axis: Some(axis),
                 cause,
             } => match self.network.nodes.get(usize::from(*axis)) {
-                Some(node) => self.fault(format_args!(
-                    "node {} ({}): {cause}; then reset the board",
-                    node.id, node.name
-                )),
-                None => self.fault(format_args!("{event}")),
+                Some(node) => fault!(
+                    self,
+                    "node {} ({=str}): {}; then reset the board",
+                    node.id,
+                    node.name,
+                    cause
+                ),
+                None => fault!(self, "{}", event),
             },
-            GroupEvent::Fault { .. } => self.fault(format_args!("{event}; then reset the board")),
+            GroupEvent::Fault { .. } => fault!(self, "{}; then reset the board", event),
             GroupEvent::State {
                 to: GroupState::Standby,
                 ..
             } => {
-                info!("{}: press B1 to start the motion", Display2Format(event));
+                info!("{}: press B1 to start the motion", event);
             }
             GroupEvent::State {
                 to: GroupState::Faulted,
                 ..
             } => {
-                warn!("{}: reset the board to start again", Display2Format(event));
+                warn!("{}: reset the board to start again", event);
             }
             GroupEvent::ReleaseRefused(_)
             | GroupEvent::Coasting { .. }
             | GroupEvent::NotAtRest { .. }
-            | GroupEvent::Lost { .. } => warn!("{}", Display2Format(event)),
-            _ => info!("{}", Display2Format(event)),
+            | GroupEvent::Lost { .. } => warn!("{}", event),
+            _ => info!("{}", event),
         }
     }
 }

@@ -19,12 +19,14 @@ mod leds;
 #[cfg(target_os = "none")]
 mod log;
 #[cfg(target_os = "none")]
+mod panic;
+#[cfg(target_os = "none")]
 mod roll;
 #[cfg(target_os = "none")]
 mod wake;
 
 #[cfg(target_os = "none")]
-use {defmt_rtt as _, panic_probe as _};
+use defmt_rtt as _;
 
 #[cfg(not(target_os = "none"))]
 fn main() {

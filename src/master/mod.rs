@@ -22,5 +22,5 @@ pub use debounce::Debounce;
 pub use od::{Cycle, MasterOd, Reception, TPDOS_PER_AXIS, TpdoSlot, TpdoSlots};
 pub use ramps::Ramps;
 pub use roll_call::RollCall;
-pub use supervisor::{Notice, Report, Supervisor};
+pub use supervisor::{Advice, Notice, Report, Supervisor};
 pub use tx_queue::{Overflow, Put, TxQueue};

@@ -8,7 +8,7 @@ use crate::motion::FaultCause;
 use crate::network::Network;
 use crate::nmt::{Consumer, ErrorControl, Heard, Lost, State};
 use crate::time::{Duration, Instant};
-use core::fmt;
+use crate::words::in_words;
 use heapless::Vec;
 
 /// Consumer heartbeat time in percent of the producer's: the second heartbeat in
@@ -70,43 +70,64 @@ impl Notice {
     }
 
     /// What to do about it.
-    pub const fn advice(&self) -> &'static str {
+    pub const fn advice(&self) -> Advice {
         match self {
             Notice::Emcy { emcy, .. } => match emcy.code.class() {
-                Class::Reset => "nothing to do",
-                Class::Warning => "the drive goes on",
-                Class::Fault => "remove the cause, then reset the board",
+                Class::Reset => Advice::None,
+                Class::Warning => Advice::GoesOn,
+                Class::Fault => Advice::RemoveCause,
             },
-            Notice::HeartbeatLost(_) => "check its cable and supply, then reset the board",
-            Notice::HeartbeatBack(_) => "reset the board to use it",
-            Notice::BootUp(_) => {
-                "it was reset or lost its supply: check that, then reset the board"
-            }
-            Notice::NotOperational { .. } => {
-                "look for another master on the bus, then reset the board"
-            }
+            Notice::HeartbeatLost(_) => Advice::CheckCable,
+            Notice::HeartbeatBack(_) => Advice::Restart,
+            Notice::BootUp(_) => Advice::CheckSupply,
+            Notice::NotOperational { .. } => Advice::FindMaster,
         }
     }
 }
 
-impl fmt::Display for Notice {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "node {}: ", self.node())?;
-        match self {
-            Notice::Emcy { emcy, .. } => {
-                write!(
-                    f,
-                    "emergency {}, error register: {}",
-                    emcy.code, emcy.register
-                )
-            }
-            Notice::HeartbeatLost(lost) => write!(f, "heartbeat lost, last state {}", lost.last),
-            Notice::HeartbeatBack(_) => f.write_str("heartbeat is back"),
-            Notice::BootUp(_) => f.write_str("booted again"),
-            Notice::NotOperational { state, .. } => write!(f, "went to NMT {state} unasked"),
-        }
-    }
+in_words!(Notice {
+    Notice::Emcy { node, emcy } => (
+        "node {}: emergency {}, error register: {}", node, emcy.code, emcy.register
+    ),
+    Notice::HeartbeatLost(Lost { node, last, .. }) => (
+        "node {}: heartbeat lost, last state {}", node, last
+    ),
+    Notice::HeartbeatBack(node) => ("node {}: heartbeat is back", node),
+    Notice::BootUp(node) => ("node {}: booted again", node),
+    Notice::NotOperational { node, state } => ("node {}: went to NMT {} unasked", node, state),
+});
+
+/// What to do about a [`Notice`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Advice {
+    /// It is over.
+    None,
+    /// A warning.
+    GoesOn,
+    /// The drive is faulted.
+    RemoveCause,
+    /// The node is not heard.
+    CheckCable,
+    /// The node is heard again.
+    Restart,
+    /// The node was reset.
+    CheckSupply,
+    /// Somebody else commands the node.
+    FindMaster,
 }
+
+in_words!(Advice {
+    Advice::None => ("nothing to do"),
+    Advice::GoesOn => ("the drive goes on"),
+    Advice::RemoveCause => ("remove the cause, then reset the board"),
+    Advice::CheckCable => ("check its cable and supply, then reset the board"),
+    Advice::Restart => ("reset the board to use it"),
+    Advice::CheckSupply => (
+        "it was reset or lost its supply: check that, then reset the board"
+    ),
+    Advice::FindMaster => ("look for another master on the bus, then reset the board"),
+});
 
 /// A notice, and the axis that it is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -233,6 +254,15 @@ impl<const N: usize> Supervisor<N> {
             .enumerate()
             .find_map(|(axis, watched)| Some((axis, watched.poll(armed, now)?)))?;
         Some(self.report(Some(axis), notice))
+    }
+
+    /// The heartbeat of `node` may stay away for `time` from now on; zero: for
+    /// ever.
+    pub fn set_consumer_time(&mut self, node: NodeId, time: Duration) {
+        let watched = self.nodes.iter_mut().map(|watched| &mut watched.consumer);
+        for consumer in watched.filter(|consumer| consumer.node() == node) {
+            consumer.set_time(time);
+        }
     }
 
     fn report(&self, axis: Option<usize>, notice: Notice) -> Report {
@@ -401,6 +431,9 @@ mod tests {
             notice.to_string(),
             "node 3: emergency 8611h (following error), error register: manufacturer"
         );
-        assert_eq!(notice.advice(), "remove the cause, then reset the board");
+        assert_eq!(
+            notice.advice().to_string(),
+            "remove the cause, then reset the board"
+        );
     }
 }

@@ -1,11 +1,10 @@
 //! Motion programs: a constant table that one release runs through once.
 
-use core::fmt;
-
 use super::group::GroupConfig;
 use super::profile::{Limits, Timing};
 use super::scale::Scale;
 use crate::time::Duration;
+use crate::words::in_words;
 
 /// One axis' part of a move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,7 +46,6 @@ pub struct Program<const N: usize> {
 
 /// The quantity of a move that a bound of the axis forbids.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Limit {
     /// Highest speed, rpm.
@@ -60,20 +58,15 @@ pub enum Limit {
     Target,
 }
 
-impl fmt::Display for Limit {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Limit::Velocity => "velocity in rpm",
-            Limit::Acceleration => "acceleration in rpm/s",
-            Limit::Deceleration => "deceleration in rpm/s",
-            Limit::Target => "target in increments from home",
-        })
-    }
-}
+in_words!(Limit {
+    Limit::Velocity => ("velocity in rpm"),
+    Limit::Acceleration => ("acceleration in rpm/s"),
+    Limit::Deceleration => ("deceleration in rpm/s"),
+    Limit::Target => ("target in increments from home"),
+});
 
 /// Why a program cannot be run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum PlanError {
     /// A value of a move lies outside the limits of the axis.
@@ -94,27 +87,15 @@ pub enum PlanError {
     },
 }
 
-impl fmt::Display for PlanError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            PlanError::OutOfLimits {
-                axis,
-                limit,
-                value,
-                allowed,
-            } => write!(
-                f,
-                "axis {}: {limit} is {value}, at most {allowed} allowed: change the program",
-                axis + 1
-            ),
-            PlanError::TooLong { axis } => write!(
-                f,
-                "axis {}: the move takes too long: raise its velocity or accelerations",
-                axis + 1
-            ),
-        }
-    }
-}
+in_words!(PlanError {
+    PlanError::OutOfLimits { axis, limit, value, allowed } => (
+        "axis {}: {} is {}, at most {} allowed: change the program",
+        axis + 1, limit, value, allowed
+    ),
+    PlanError::TooLong { axis } => (
+        "axis {}: the move takes too long: raise its velocity or accelerations", axis + 1
+    ),
+});
 
 impl core::error::Error for PlanError {}
 

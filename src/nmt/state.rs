@@ -1,11 +1,10 @@
 //! NMT states and what they allow (CiA 301, 7.3.2.2).
 
-use core::fmt;
+use crate::words::in_words;
 
 /// The NMT state of a node as error control reports it (CiA 301, 7.2.8.3.2).
 /// Unknown states survive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum State {
     /// On the wire: the boot-up message.
     Initialising,
@@ -75,14 +74,10 @@ impl State {
     }
 }
 
-impl fmt::Display for State {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            State::Initialising => f.write_str("initialising"),
-            State::Stopped => f.write_str("stopped"),
-            State::Operational => f.write_str("operational"),
-            State::PreOperational => f.write_str("pre-operational"),
-            State::Other(code) => write!(f, "unknown state {code:02X}h"),
-        }
-    }
-}
+in_words!(State {
+    State::Initialising => ("initialising"),
+    State::Stopped => ("stopped"),
+    State::Operational => ("operational"),
+    State::PreOperational => ("pre-operational"),
+    State::Other(code) => ("unknown state {:02X}h", code),
+});

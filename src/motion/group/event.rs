@@ -1,13 +1,11 @@
 //! What a group reports, with the facts for a log.
 
-use core::fmt;
-
 use crate::cia402::{State, StatusWord, Timeout};
 use crate::motion::program::PlanError;
+use crate::words::in_words;
 
 /// State of a group of axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum GroupState {
     /// The network is not ready; every axis is told to stay off.
     Idle,
@@ -26,23 +24,18 @@ pub enum GroupState {
     Faulted,
 }
 
-impl fmt::Display for GroupState {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            GroupState::Idle => "idle",
-            GroupState::Enabling => "enabling",
-            GroupState::Standby => "standby",
-            GroupState::Moving => "moving",
-            GroupState::Stopping => "stopping",
-            GroupState::FaultStop => "stopping after a fault",
-            GroupState::Faulted => "faulted",
-        })
-    }
-}
+in_words!(GroupState {
+    GroupState::Idle => ("idle"),
+    GroupState::Enabling => ("enabling"),
+    GroupState::Standby => ("standby"),
+    GroupState::Moving => ("moving"),
+    GroupState::Stopping => ("stopping"),
+    GroupState::FaultStop => ("stopping after a fault"),
+    GroupState::Faulted => ("faulted"),
+});
 
 /// Why the group stops and disables its axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum FaultCause {
     /// The drive reports a fault in its statusword.
@@ -90,47 +83,35 @@ pub enum FaultCause {
     NetworkLost,
 }
 
-impl fmt::Display for FaultCause {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            FaultCause::DriveFault { status } => write!(
-                f,
-                "the drive reports \"{}\" (statusword {:#06x}): see its emergency message",
-                status.state(),
-                status.0
-            ),
-            FaultCause::LeftEnabled { status } => write!(
-                f,
-                "the drive went to \"{}\" by itself (statusword {:#06x}): check supply, enable input and wiring",
-                status.state(),
-                status.0
-            ),
-            FaultCause::NotEnabled(timeout) => write!(f, "{timeout}"),
-            FaultCause::TpdoMissing { cycles } => write!(
-                f,
-                "no TPDO in {cycles} cycles in a row: check the cable and the drive's supply"
-            ),
-            FaultCause::FollowingError { error, allowed } => write!(
-                f,
-                "following error of {error} increments, {allowed} allowed: check for a blocked axis, load and limits"
-            ),
-            FaultCause::NotArrived { error } => {
-                write!(f, "did not arrive: {error} increments short of the target")
-            }
-            FaultCause::Program(error) => write!(f, "{error}"),
-            FaultCause::HeartbeatLost => {
-                f.write_str("heartbeat lost: check the cable and the drive's supply")
-            }
-            FaultCause::Emergency { code } => write!(f, "emergency {code:#06x}"),
-            FaultCause::LeftOperational => f.write_str("the node left NMT operational"),
-            FaultCause::NetworkLost => f.write_str("the network is no longer complete"),
-        }
-    }
-}
+in_words!(FaultCause {
+    FaultCause::DriveFault { status } => (
+        "the drive reports \"{}\" (statusword {:#06x}): see its emergency message",
+        status.state(), status.0
+    ),
+    FaultCause::LeftEnabled { status } => (
+        "the drive went to \"{}\" by itself (statusword {:#06x}): check supply, enable input and wiring",
+        status.state(), status.0
+    ),
+    FaultCause::NotEnabled(timeout) => ("{}", timeout),
+    FaultCause::TpdoMissing { cycles } => (
+        "no TPDO in {} cycles in a row: check the cable and the drive's supply", cycles
+    ),
+    FaultCause::FollowingError { error, allowed } => (
+        "following error of {} increments, {} allowed: check for a blocked axis, load and limits",
+        error, allowed
+    ),
+    FaultCause::NotArrived { error } => (
+        "did not arrive: {} increments short of the target", error
+    ),
+    FaultCause::Program(error) => ("{}", error),
+    FaultCause::HeartbeatLost => ("heartbeat lost: check the cable and the drive's supply"),
+    FaultCause::Emergency { code } => ("emergency {:#06x}", code),
+    FaultCause::LeftOperational => ("the node left NMT operational"),
+    FaultCause::NetworkLost => ("the network is no longer complete"),
+});
 
 /// Why a release was not accepted. Nothing has been sent because of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Refusal {
     /// A release counts in standby only.
@@ -153,24 +134,19 @@ pub enum Refusal {
     Program(PlanError),
 }
 
-impl fmt::Display for Refusal {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Refusal::NotInStandby(state) => write!(f, "the group is {state}, not in standby"),
-            Refusal::StopRequested => f.write_str("a stop was requested at the same time"),
-            Refusal::NotFresh { axis } => write!(f, "axis {}: no TPDO in this cycle", axis + 1),
-            Refusal::NotAtRest { axis, velocity } => {
-                write!(f, "axis {}: still turning at {velocity} rpm", axis + 1)
-            }
-            Refusal::Program(error) => write!(f, "{error}"),
-        }
-    }
-}
+in_words!(Refusal {
+    Refusal::NotInStandby(state) => ("the group is {}, not in standby", state),
+    Refusal::StopRequested => ("a stop was requested at the same time"),
+    Refusal::NotFresh { axis } => ("axis {}: no TPDO in this cycle", axis + 1),
+    Refusal::NotAtRest { axis, velocity } => (
+        "axis {}: still turning at {} rpm", axis + 1, velocity
+    ),
+    Refusal::Program(error) => ("{}", error),
+});
 
 /// Something that happened in a step, for the log. Axes are counted from 0 and
 /// shown from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum GroupEvent {
     /// The group changed its state.
@@ -235,33 +211,22 @@ pub enum GroupEvent {
     },
 }
 
-impl fmt::Display for GroupEvent {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            GroupEvent::State { from, to } => write!(f, "group: {from} -> {to}"),
-            GroupEvent::AxisState { axis, state } => write!(f, "axis {}: {state}", axis + 1),
-            GroupEvent::ReleaseRefused(why) => write!(f, "release refused: {why}"),
-            GroupEvent::StepStarted { step } => write!(f, "program step {}", step + 1),
-            GroupEvent::Arrived {
-                axis,
-                target,
-                error,
-            } => write!(f, "axis {}: arrived at {target}, error {error}", axis + 1),
-            GroupEvent::ProgramDone => f.write_str("program done"),
-            GroupEvent::Fault {
-                axis: Some(axis),
-                cause,
-            } => write!(f, "axis {}: {cause}", axis + 1),
-            GroupEvent::Fault { axis: None, cause } => write!(f, "{cause}"),
-            GroupEvent::Coasting { axis, state } => {
-                write!(f, "axis {}: left to its drive in \"{state}\"", axis + 1)
-            }
-            GroupEvent::NotAtRest { axis, velocity } => write!(
-                f,
-                "axis {}: not seen at rest, last speed {velocity} rpm; disabled",
-                axis + 1
-            ),
-            GroupEvent::Lost { count } => write!(f, "{count} events lost"),
-        }
-    }
-}
+in_words!(GroupEvent {
+    GroupEvent::State { from, to } => ("group: {} -> {}", from, to),
+    GroupEvent::AxisState { axis, state } => ("axis {}: {}", axis + 1, state),
+    GroupEvent::ReleaseRefused(why) => ("release refused: {}", why),
+    GroupEvent::StepStarted { step } => ("program step {}", step + 1),
+    GroupEvent::Arrived { axis, target, error } => (
+        "axis {}: arrived at {}, error {}", axis + 1, target, error
+    ),
+    GroupEvent::ProgramDone => ("program done"),
+    GroupEvent::Fault { axis: Some(axis), cause } => ("axis {}: {}", axis + 1, cause),
+    GroupEvent::Fault { axis: None, cause } => ("{}", cause),
+    GroupEvent::Coasting { axis, state } => (
+        "axis {}: left to its drive in \"{}\"", axis + 1, state
+    ),
+    GroupEvent::NotAtRest { axis, velocity } => (
+        "axis {}: not seen at rest, last speed {} rpm; disabled", axis + 1, velocity
+    ),
+    GroupEvent::Lost { count } => ("{} events lost", count),
+});
