@@ -31,6 +31,19 @@ pub const BUTTON_SAMPLES: u8 = 20;
 /// nodes, an NMT command for each, and a heartbeat: 25. What is over is reserve.
 pub const TX_QUEUE: usize = 32;
 
+/// While so many frames wait for a transmit buffer, the board's own SDO server
+/// sends no further segment of a block: the rest of the queue is for those who
+/// cannot wait.
+pub const OWN_FRAMES: usize = 8;
+
+/// The shortest SYNC period (1006h), in microseconds: the deadline and as much
+/// again for the RPDOs.
+pub const SHORTEST_CYCLE_US: u32 = 2 * TPDO_DEADLINE_US as u32;
+
+/// Changed settings that may wait for `network`: those of every node at once,
+/// and one that the ring leaves empty.
+pub const ORDER_QUEUE: usize = 2 * AXES;
+
 /// Frames that may wait for a task, plus one that the ring leaves empty. The
 /// tasks are woken by the first; this is a burst from every node at once.
 pub const RX_QUEUE: usize = 32;

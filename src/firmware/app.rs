@@ -24,25 +24,29 @@ mod app {
         axes::Axes,
         control::Control,
         counters::{self, Counts},
+        duties::{act, obey, serve},
         filters::{self, Handler},
         leds,
         log::{Log, News, UPTIME_MS},
+        own_node::{Order, OwnNode},
+        report::{publish, tell},
         roll::{self, Task},
         wake,
     };
     use canmaster::{
         Frame,
-        boot::{Action, Event, NetworkBoot},
+        boot::{Action, NetworkBoot},
         design::{self, AXES},
+        device::MasterError,
         id::{CobId, FunctionCode},
         master::{
-            self, AxisMap, Debounce, ExtendedClock, MasterOd, Put, Reception, Report, Supervisor,
-            TPDOS_PER_AXIS, TpdoSlot, TpdoSlots, TxQueue,
+            self, AxisMap, Debounce, ExtendedClock, MasterOd, Put, Reception, Supervisor,
+            TPDOS_PER_AXIS, TpdoSlot, TxQueue,
         },
-        motion::{GroupEvent, experiment},
+        motion::{AxisCommand, GroupEvent, experiment},
         network::{Network, sample},
         nmt,
-        time::Instant,
+        time::{Duration, Instant},
     };
     use core::{mem::MaybeUninit, sync::atomic::Ordering};
     use heapless::{
@@ -52,10 +56,10 @@ mod app {
     use nucleo_g474re::{
         Config, can, pac::Interrupt, pins, reset_cause::ResetCause, timers, watchdog::Watchdog,
     };
-    use rtic::Mutex;
 
     type FrameQueue = Queue<Frame, { design::RX_QUEUE }>;
     type NewsQueue = Queue<News, { design::LOG_QUEUE }>;
+    type OrderQueue = Queue<Order, { design::ORDER_QUEUE }>;
     type EventQueue = Queue<GroupEvent, { design::LOG_QUEUE }>;
 
     static NETWORK: &Network = &sample::SIX_EPOS4;
@@ -68,6 +72,7 @@ mod app {
         tx_queue: TxQueue<{ design::TX_QUEUE }>,
         control: Control,
         bus: can::ErrorState,
+        commands: [AxisCommand; AXES],
     }
 
     #[local]
@@ -78,6 +83,7 @@ mod app {
         axis_map: AxisMap,
         to_network: Producer<'static, Frame>,
         answers_to: Producer<'static, Frame>,
+        requests_to: Producer<'static, Frame>,
         deadline: timers::Deadline,
         axes: &'static mut Axes,
         events_to: Producer<'static, GroupEvent>,
@@ -94,6 +100,8 @@ mod app {
         news_to: Producer<'static, News>,
         supervisor: Supervisor<AXES>,
         heartbeat: nmt::Producer,
+        heartbeat_time: Duration,
+        orders: Consumer<'static, Order>,
         counts: Counts,
         known_bus: can::ErrorState,
         reset_cause: ResetCause,
@@ -103,6 +111,10 @@ mod app {
         states: Consumer<'static, Frame>,
         news: Consumer<'static, News>,
         events: Consumer<'static, GroupEvent>,
+        own: &'static mut OwnNode,
+        requests: Consumer<'static, Frame>,
+        orders_to: Producer<'static, Order>,
+        sync_period: timers::SyncPeriod,
     }
 
     /// Sets up the board and hands each task its part. Runs with interrupts off,
@@ -110,10 +122,13 @@ mod app {
     #[init(local = [
         axes_place: MaybeUninit<Axes> = MaybeUninit::uninit(),
         boot_place: MaybeUninit<NetworkBoot<AXES>> = MaybeUninit::uninit(),
+        own_place: MaybeUninit<OwnNode> = MaybeUninit::uninit(),
         lengths: [[u8; TPDOS_PER_AXIS]; AXES] = [[0; TPDOS_PER_AXIS]; AXES],
         network_queue: FrameQueue = Queue::new(),
         answer_queue: FrameQueue = Queue::new(),
         state_queue: FrameQueue = Queue::new(),
+        request_queue: FrameQueue = Queue::new(),
+        order_queue: OrderQueue = Queue::new(),
         news_queue: NewsQueue = Queue::new(),
         event_queue: EventQueue = Queue::new(),
     ])]
@@ -139,6 +154,8 @@ mod app {
         let (states_to, states) = cx.local.state_queue.split();
         let (news_to, news) = cx.local.news_queue.split();
         let (events_to, events) = cx.local.event_queue.split();
+        let (requests_to, requests) = cx.local.request_queue.split();
+        let (orders_to, orders) = cx.local.order_queue.split();
         let sync = defmt::unwrap!(can::Element::new(&Frame::empty(CobId::SYNC)));
         defmt::unwrap!(sdo_configurator::spawn().ok());
         (
@@ -148,6 +165,7 @@ mod app {
                 tx_queue: TxQueue::new(),
                 control: Control::new(),
                 bus: can::ErrorState::Active,
+                commands: [AxisCommand::default(); AXES],
             },
             Local {
                 period: board.period,
@@ -156,6 +174,7 @@ mod app {
                 axis_map: AxisMap::new(NETWORK),
                 to_network,
                 answers_to,
+                requests_to,
                 deadline: board.deadline,
                 axes: place(cx.local.axes_place, new_axes),
                 events_to,
@@ -172,6 +191,8 @@ mod app {
                 news_to,
                 supervisor: Supervisor::new(NETWORK),
                 heartbeat: nmt::Producer::new(NETWORK.master.node),
+                heartbeat_time: NETWORK.master.heartbeat,
+                orders,
                 counts: Counts::default(),
                 known_bus: can::ErrorState::Active,
                 reset_cause: board.reset_cause,
@@ -181,6 +202,10 @@ mod app {
                 states,
                 news,
                 events,
+                own: place(cx.local.own_place, new_own_node),
+                requests,
+                orders_to,
+                sync_period: board.sync_period,
             },
         )
     }
@@ -198,6 +223,10 @@ mod app {
 
     fn new_boot() -> NetworkBoot<AXES> {
         NetworkBoot::new(NETWORK, Instant::ZERO)
+    }
+
+    fn new_own_node() -> OwnNode {
+        OwnNode::new(NETWORK)
     }
 
     /// Sleeps until the next interrupt.
@@ -240,7 +269,7 @@ mod app {
     #[task(
         binds = FDCAN1_IT0,
         priority = 4,
-        local = [can_rx, axis_map, to_network, answers_to],
+        local = [can_rx, axis_map, to_network, answers_to, requests_to],
         shared = [od, can_tx, tx_queue, bus]
     )]
     fn can_irq(mut cx: can_irq::Context) {
@@ -249,6 +278,7 @@ mod app {
             axis_map,
             to_network,
             answers_to,
+            requests_to,
             ..
         } = cx.local;
         let flags = can_rx.take_flags();
@@ -294,6 +324,10 @@ mod app {
                 }
                 Handler::SdoResponse => {
                     queue(answers_to, element.frame());
+                    answered = true;
+                }
+                Handler::Request => {
+                    queue(requests_to, element.frame());
                     answered = true;
                 }
             }
@@ -347,7 +381,7 @@ mod app {
         binds = TIM3,
         priority = 3,
         local = [deadline, axes, events_to],
-        shared = [od, tx_queue, control]
+        shared = [od, tx_queue, control, commands]
     )]
     fn pdo_producer(mut cx: pdo_producer::Context) {
         let deadline = cx.local.deadline.take();
@@ -365,6 +399,11 @@ mod app {
         let axes = cx.local.axes;
         axes.read(&cycle, |slot| cx.shared.od.lock(|od| od.tpdo(slot)));
         axes.step(&control);
+        let enabled = axes.enabled();
+        (&mut cx.shared.control, &mut cx.shared.commands).lock(|control, commands| {
+            control.axes_enabled = enabled;
+            *commands = *axes.commands();
+        });
         if !control.bus_off {
             axes.write(
                 |frame| match cx.shared.tx_queue.lock(|queue| queue.put_latest(frame)) {
@@ -394,7 +433,8 @@ mod app {
         priority = 2,
         local = [
             tick, microseconds, milliseconds, run_led, error_led, button, debounce, watchdog,
-            from_can, states_to, news_to, supervisor, heartbeat, counts, known_bus,
+            from_can, states_to, news_to, supervisor, heartbeat, heartbeat_time,
+            orders, counts, known_bus,
         ],
         shared = [od, tx_queue, control, bus]
     )]
@@ -433,8 +473,14 @@ mod app {
         if control.network_ready {
             local.supervisor.arm();
         }
-        if control.speaking && local.heartbeat.next_deadline().is_none() {
-            local.heartbeat.set_period(NETWORK.master.heartbeat, now);
+        while let Some(order) = local.orders.dequeue() {
+            match order {
+                Order::Heartbeat(time) => *local.heartbeat_time = time,
+                Order::Consumer(node, time) => local.supervisor.set_consumer_time(node, time),
+            }
+        }
+        if control.speaking && local.heartbeat.period() != *local.heartbeat_time {
+            local.heartbeat.set_period(*local.heartbeat_time, now);
         }
         if let Some(frame) = local.heartbeat.poll(now, control.state())
             && !control.bus_off
@@ -465,26 +511,6 @@ mod app {
         }
     }
 
-    /// Hands a report to the log, and a fault to the group.
-    fn tell(
-        report: Report,
-        news: &mut Producer<'static, News>,
-        control: &mut impl rtic::Mutex<T = Control>,
-    ) {
-        if let (Some(axis), Some(cause)) = (report.axis, report.fault) {
-            control.lock(|control| control.tell_fault(axis, cause));
-        }
-        publish(news, News::Node(report));
-    }
-
-    /// Hands something to the log.
-    fn publish(to: &mut Producer<'static, News>, news: News) {
-        if to.enqueue(news).is_err() {
-            counters::LOG_FULL.count();
-        }
-        wake::want();
-    }
-
     /// Boots, checks and configures the nodes, all at once, starts them, and
     /// writes the log.
     ///
@@ -494,8 +520,11 @@ mod app {
     /// resets the board.
     #[task(
         priority = 1,
-        local = [reset_cause, clock, boot, answers, states, news, events],
-        shared = [od, tx_queue, control]
+        local = [
+            reset_cause, clock, boot, answers, states, news, events, own, requests, orders_to,
+            sync_period,
+        ],
+        shared = [od, tx_queue, control, commands]
     )]
     async fn sdo_configurator(mut cx: sdo_configurator::Context) {
         let local = cx.local;
@@ -510,27 +539,57 @@ mod app {
             "silent for {=u32} ms, so that drives left running come to rest",
             NETWORK.master.silence.as_millis()
         );
-        let boot = local.boot;
+        let (boot, own) = (local.boot, local.own);
+        if *local.reset_cause == ResetCause::Watchdog {
+            own.device.raise(MasterError::Watchdog);
+        }
         loop {
             // The time first, then one frame at a time: each may cause several
             // actions, which are carried out before the next.
             loop {
                 while let Some(action) = boot.poll(now(*local.clock)) {
+                    if let Action::Report(event) = &action {
+                        own.boot(event);
+                    }
+                    if action == Action::ProduceSync {
+                        own.device.set_sync_producer(true);
+                    }
                     act(&action, &mut log, &mut cx.shared);
                 }
-                let frame = local.answers.dequeue().or_else(|| local.states.dequeue());
-                let Some(frame) = frame else { break };
+                let state = || {
+                    local
+                        .states
+                        .dequeue()
+                        .inspect(|frame| own.error_control(frame))
+                };
+                let Some(frame) = local.answers.dequeue().or_else(state) else {
+                    break;
+                };
                 boot.on_frame(&frame, now(*local.clock));
             }
             while let Some(news) = local.news.dequeue() {
+                own.news(&news);
                 log.news(&news);
             }
             while let Some(event) = local.events.dequeue() {
+                own.group(&event);
                 log.group(&event);
+            }
+            while serve(own, local.requests, now(*local.clock), &mut cx.shared) {
+                while let Some(event) = own.device.take_event() {
+                    obey(
+                        &event,
+                        own,
+                        local.sync_period,
+                        local.orders_to,
+                        &mut cx.shared,
+                    );
+                }
             }
             roll::check_in(Task::SdoConfigurator);
             let latest = now(*local.clock) + design::CONFIGURATOR_PERIOD;
-            let next = boot.next_deadline().map_or(latest, |next| next.min(latest));
+            let next = [boot.next_deadline(), own.device.next_deadline()];
+            let next = next.into_iter().flatten().fold(latest, Instant::min);
             wake::at(next.as_micros() as u32);
             wake.wait().await;
         }
@@ -538,24 +597,5 @@ mod app {
 
     fn now(clock: timers::Microseconds) -> Instant {
         CLOCK.now(|| clock.now())
-    }
-
-    /// Carries out what the boot-up asks for.
-    fn act(action: &Action, log: &mut Log, shared: &mut sdo_configurator::SharedResources<'_>) {
-        match action {
-            Action::Send(frame) => {
-                // A full queue counts it; an SDO request is repeated.
-                let _ = shared.tx_queue.lock(|queue| queue.put(*frame));
-                rtic::pend(Interrupt::FDCAN1_IT0);
-            }
-            Action::ProduceSync => shared.od.lock(|od| od.set_sync_producer(true)),
-            Action::Report(event) => {
-                if *event == Event::StartSent {
-                    shared.od.lock(|od| od.expect(TpdoSlots::all_of(AXES)));
-                }
-                shared.control.lock(|control| control.boot(event));
-                log.boot(event);
-            }
-        }
     }
 }

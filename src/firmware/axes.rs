@@ -3,6 +3,7 @@
 use crate::control::Control;
 use canmaster::{
     Frame,
+    cia402::StatusWord,
     design::AXES,
     master::{self, Cycle, Ramps, TpdoSlot},
     motion::{AxisCommand, AxisFeedback, Group, GroupConfig, GroupEvent, GroupState, Request},
@@ -47,12 +48,24 @@ impl Axes {
         let moving = self.group.state() == GroupState::Moving;
         let request = Request {
             // After bus-off the way back is a reset of the board.
-            network_ready: control.network_ready && !control.bus_off,
+            network_ready: control.network_ready && !control.bus_off && !control.cycle_differs,
             release: control.pressed && !moving,
             stop: control.pressed && moving,
             fault: control.fault,
         };
         self.group.step(request, &self.feedback, &mut self.commands);
+    }
+
+    /// What the axes are told.
+    pub(crate) const fn commands(&self) -> &[AxisCommand; AXES] {
+        &self.commands
+    }
+
+    /// Whether an axis is enabled or led there.
+    pub(crate) fn enabled(&self) -> bool {
+        let led = !matches!(self.group.state(), GroupState::Idle | GroupState::Faulted);
+        let is = |feedback: &AxisFeedback| StatusWord(feedback.statusword).state().is_enabled();
+        led || self.feedback.iter().any(is)
     }
 
     /// What the group has to report.

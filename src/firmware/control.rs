@@ -20,6 +20,10 @@ pub struct Control {
     pub(crate) boot_failed: bool,
     /// The controller is or was bus-off.
     pub(crate) bus_off: bool,
+    /// An axis is or is being enabled.
+    pub(crate) axes_enabled: bool,
+    /// 1006h is not the cycle that the group is made for: no axis is enabled.
+    pub(crate) cycle_differs: bool,
 }
 
 impl Control {
@@ -32,6 +36,8 @@ impl Control {
             fault: None,
             boot_failed: false,
             bus_off: false,
+            axes_enabled: false,
+            cycle_differs: false,
         }
     }
 

@@ -1,7 +1,8 @@
 //! Which frames are received, and what each is: the index of the filter that
 //! matched selects the handler.
 
-use canmaster::id::FunctionCode;
+use canmaster::id::{CobId, FunctionCode};
+use canmaster::network::sample;
 use nucleo_g474re::can::{Fifo, RangeFilter};
 
 /// What a received frame is.
@@ -13,6 +14,8 @@ pub(crate) enum Handler {
     SdoResponse,
     /// Boot-up and heartbeat.
     ErrorControl,
+    /// For the board itself: an SDO request, TIME.
+    Request,
 }
 
 const NODE_MAX: u16 = 127;
@@ -27,14 +30,24 @@ const fn nodes(function: FunctionCode, fifo: Fifo) -> RangeFilter {
     }
 }
 
+const fn one(identifier: u16) -> RangeFilter {
+    RangeFilter {
+        first: identifier,
+        last: identifier,
+        fifo: Fifo::Fifo1,
+    }
+}
+
 /// The filters. Process data and the rest come through different FIFOs, so that
 /// a burst of one does not push out the other.
-pub(crate) static FILTERS: [RangeFilter; 5] = [
+pub(crate) static FILTERS: [RangeFilter; 7] = [
     nodes(FunctionCode::Tpdo1, Fifo::Fifo0),
     nodes(FunctionCode::Tpdo2, Fifo::Fifo0),
     nodes(FunctionCode::Emcy, Fifo::Fifo1),
     nodes(FunctionCode::SdoResponse, Fifo::Fifo1),
     nodes(FunctionCode::ErrorControl, Fifo::Fifo1),
+    one(CobId::of(FunctionCode::SdoRequest, sample::SIX_EPOS4.master.node).get()),
+    one(CobId::TIME.get()),
 ];
 
 /// The handler of each filter.
@@ -44,4 +57,6 @@ pub(crate) static HANDLERS: [Handler; FILTERS.len()] = [
     Handler::Emcy,
     Handler::SdoResponse,
     Handler::ErrorControl,
+    Handler::Request,
+    Handler::Request,
 ];

@@ -11,6 +11,8 @@ mod control;
 #[cfg(target_os = "none")]
 mod counters;
 #[cfg(target_os = "none")]
+mod duties;
+#[cfg(target_os = "none")]
 mod filters;
 #[cfg(target_os = "none")]
 mod hard_fault;
@@ -19,7 +21,11 @@ mod leds;
 #[cfg(target_os = "none")]
 mod log;
 #[cfg(target_os = "none")]
+mod own_node;
+#[cfg(target_os = "none")]
 mod panic;
+#[cfg(target_os = "none")]
+mod report;
 #[cfg(target_os = "none")]
 mod roll;
 #[cfg(target_os = "none")]

@@ -15,11 +15,13 @@ pub mod can;
 pub mod clock;
 pub mod pins;
 pub mod reset_cause;
+mod serial_number;
 pub mod timers;
 pub mod watchdog;
 
 mod message_ram;
 
+pub use serial_number::serial_number;
 pub use stm32g4xx_hal::pac;
 
 use stm32g4xx_hal::{gpio::GpioExt, pwr::PwrExt, rcc::RccExt};
@@ -56,6 +58,8 @@ pub struct Devices {
     pub period: timers::Period,
     /// TIM3: runs with TIM2; its compare event comes at the deadline.
     pub deadline: timers::Deadline,
+    /// Changes the period of both.
+    pub sync_period: timers::SyncPeriod,
     /// TIM7: every millisecond.
     pub tick: timers::Tick,
     /// TIM5: free-running microseconds.
@@ -116,6 +120,7 @@ pub fn setup(peripherals: pac::Peripherals, config: &Config) -> Devices {
         can_rx,
         period: timers.period,
         deadline: timers.deadline,
+        sync_period: timers.sync_period,
         tick: timers.tick,
         microseconds: timers.microseconds,
         run_led: pins.run_led,

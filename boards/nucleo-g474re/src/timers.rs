@@ -41,6 +41,42 @@ impl Deadline {
     }
 }
 
+/// Changes the period of [`Period`] and [`Deadline`] together.
+pub struct SyncPeriod(());
+
+/// Ticks around the end of a period in which its length is left alone.
+const NEAR_THE_END: u32 = 50 * TICKS_PER_US;
+
+impl SyncPeriod {
+    /// From the next period on it takes `us` microseconds, which have to be more
+    /// than the deadline: less is left alone. Waits some microseconds if a period
+    /// is about to end.
+    pub fn set_us(&mut self, us: u16) {
+        // SAFETY: only the preload registers are written, each with one aligned
+        // access, and nobody else writes them after `setup`.
+        let (tim2, tim3) = unsafe { (&*pac::TIM2::ptr(), &*pac::TIM3::ptr()) };
+        if u32::from(us) <= tim3.ccr1().read().ccr().bits() {
+            return;
+        }
+        let write = |_: &cortex_m::interrupt::CriticalSection| {
+            // Both have to take it over at the end of the same period.
+            let left = tim2
+                .arr()
+                .read()
+                .bits()
+                .wrapping_sub(tim2.cnt().read().bits());
+            if left < NEAR_THE_END {
+                return false;
+            }
+            tim2.arr()
+                .write(|w| w.arr().set(u32::from(us) * TICKS_PER_US - 1));
+            tim3.arr().write(|w| w.arr().set(u32::from(us) - 1));
+            true
+        };
+        while !cortex_m::interrupt::free(write) {}
+    }
+}
+
 /// TIM7: an update event every millisecond.
 pub struct Tick(pac::TIM7);
 
@@ -77,6 +113,7 @@ pub(crate) struct Peripherals {
 pub(crate) struct Timers {
     pub(crate) period: Period,
     pub(crate) deadline: Deadline,
+    pub(crate) sync_period: SyncPeriod,
     pub(crate) tick: Tick,
     pub(crate) microseconds: Microseconds,
 }
@@ -96,7 +133,10 @@ pub(crate) fn setup(p: Peripherals, rcc: &mut Rcc, period_us: u16, deadline_us: 
     pac::TIM7::reset(rcc);
 
     // URS everywhere: the forced update that loads the prescaler raises no flag.
-    p.tim2.cr1().write(|w| w.urs().counter_only());
+    // ARPE: a new period begins when the old one has ended.
+    p.tim2
+        .cr1()
+        .write(|w| w.urs().counter_only().arpe().enabled());
     p.tim2.psc().write(|w| w.psc().set(0));
     p.tim2
         .arr()
@@ -104,7 +144,9 @@ pub(crate) fn setup(p: Peripherals, rcc: &mut Rcc, period_us: u16, deadline_us: 
     p.tim2.egr().write(|w| w.ug().update());
     p.tim2.dier().write(|w| w.uie().enabled());
 
-    p.tim3.cr1().write(|w| w.urs().counter_only());
+    p.tim3
+        .cr1()
+        .write(|w| w.urs().counter_only().arpe().enabled());
     p.tim3.psc().write(|w| w.psc().set(MICROSECOND_PRESCALER));
     p.tim3
         .arr()
@@ -134,6 +176,7 @@ pub(crate) fn setup(p: Peripherals, rcc: &mut Rcc, period_us: u16, deadline_us: 
     Timers {
         period: Period(p.tim2),
         deadline: Deadline(p.tim3),
+        sync_period: SyncPeriod(()),
         tick: Tick(p.tim7),
         microseconds: Microseconds(()),
     }

@@ -2,6 +2,7 @@
 //! the button.
 
 mod bench;
+mod guest;
 mod image;
 mod operator;
 mod program;
@@ -82,6 +83,7 @@ pub struct World<'i> {
     stations: Vec<Option<Station>>,
     ports: Vec<String>,
     bridge: Option<Bridge>,
+    guest: Option<guest::Guest>,
     agenda: Agenda,
     operator: Operator,
     watch: Watch,
@@ -145,6 +147,7 @@ impl<'i> World<'i> {
             stations,
             ports,
             bridge: None,
+            guest: None,
             agenda,
             operator,
             watch: Watch::new(moves),

@@ -88,8 +88,13 @@ impl World<'_> {
                 .find(|station| station.port == event.port)
             {
                 station.drive.on_event(event);
-            } else if let Some(bridge) = &mut self.bridge {
-                bridge.on_event(event);
+            } else {
+                if let Some(bridge) = &mut self.bridge {
+                    bridge.on_event(event);
+                }
+                if let Some(guest) = &mut self.guest {
+                    guest.on_event(event);
+                }
             }
         }
         if !events.is_empty() {
@@ -113,6 +118,9 @@ impl World<'_> {
         }
         if let Some(bridge) = &mut self.bridge {
             bridge.offer(&mut self.bus, self.now);
+        }
+        if let Some(guest) = &mut self.guest {
+            guest.offer(&mut self.bus, self.now);
         }
     }
 
