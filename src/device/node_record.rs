@@ -1,6 +1,6 @@
 //! What the master knows of a node: boot-up, NMT state, emergencies.
 
-use crate::boot::{Event, Failure};
+use crate::boot::{Cause, Event, Failure};
 use crate::emcy::{Emcy, History};
 use crate::nmt::State;
 use core::fmt;
@@ -74,8 +74,25 @@ impl fmt::Display for NodeStatus {
             NodeStatus::Configured => f.write_str("configured, heartbeat awaited"),
             NodeStatus::Ready => f.write_str("ready to be started"),
             NodeStatus::Operational => f.write_str("operational"),
-            NodeStatus::Failed(failure) => write!(f, "{failure}"),
+            NodeStatus::Failed(Failure { status, cause }) => {
+                write!(f, "{} (boot status {})", words(cause), status.letter())
+            }
         }
+    }
+}
+
+/// The cause without its facts: those are in the log, whose words take no room in
+/// the device.
+const fn words(cause: &Cause) -> &'static str {
+    match cause {
+        Cause::NoBootUp => "no boot-up frame",
+        Cause::Restarts => "restarts again and again",
+        Cause::NoAnswer { .. } => "no answer to an access",
+        Cause::Refused { .. } => "an access was refused",
+        Cause::Garbled { .. } => "wrong answer to an access",
+        Cause::Mismatch { .. } => "not the expected device",
+        Cause::NoHeartbeat => "no heartbeat after the configuration",
+        Cause::NotOperational => "not operational after NMT start",
     }
 }
 

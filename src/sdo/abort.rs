@@ -7,16 +7,6 @@ use core::fmt;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct AbortCode(pub u32);
 
-#[cfg(feature = "defmt")]
-impl defmt::Format for AbortCode {
-    fn format(&self, f: defmt::Formatter<'_>) {
-        match self.meaning() {
-            Some(words) => defmt::write!(f, "{=u32:08X}h ({=str})", self.0, words),
-            None => defmt::write!(f, "{=u32:08X}h (code of the manufacturer)", self.0),
-        }
-    }
-}
-
 macro_rules! abort_codes {
     ($($(#[$doc:meta])* $name:ident = $code:literal, $words:literal;)*) => {
         impl AbortCode {
@@ -33,6 +23,17 @@ macro_rules! abort_codes {
                     $($code => Some($words),)*
                     _ => None,
                 }
+            }
+        }
+
+        #[cfg(feature = "defmt")]
+        impl defmt::Format for AbortCode {
+            fn format(&self, f: defmt::Formatter<'_>) {
+                let words = match self.0 {
+                    $($code => defmt::intern!($words),)*
+                    _ => defmt::intern!("code of the manufacturer"),
+                };
+                defmt::write!(f, "{=u32:08X}h ({=istr})", self.0, words)
             }
         }
     };
