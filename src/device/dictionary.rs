@@ -200,9 +200,7 @@ impl<B: Board, const N: usize> View<'_, B, N> {
                 None => window.write_str("not in the network"),
             },
             Item::EmcyWords(node) => match dictionary.node(node).map(|(_, r)| r.emcy.get(0)) {
-                Some(Some(emcy)) => {
-                    write!(window, "{}, error register: {}", emcy.code, emcy.register)
-                }
+                Some(Some(emcy)) => write!(window, "{}", emcy.code),
                 Some(None) => window.write_str("no emergency"),
                 None => window.write_str("not in the network"),
             },
