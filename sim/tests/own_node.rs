@@ -124,7 +124,7 @@ fn expedited_segmented_and_block_transfers_beside_the_running_network() {
         let dcf = client.read(at(0x1F22, 1), protocol).unwrap();
         assert!(dcf.len() > 100, "{} bytes", dcf.len());
         let words = client.read(at(0x2F01, 3), protocol).unwrap();
-        assert_eq!(words, b"operational");
+        assert_eq!(words, b"axis 3: operational");
     }
     // 1F82h: every drive is operational.
     for node in 1..=6 {
