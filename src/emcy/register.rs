@@ -94,17 +94,11 @@ impl defmt::Format for BitsFrom {
             6 => defmt::intern!("reserved"),
             _ => defmt::intern!("manufacturer"),
         };
-        let separator = if register & ((1 << bit) - 1) == 0 {
-            defmt::intern!("")
+        let rest = BitsFrom(register, bit + 1);
+        if register >> bit > 1 {
+            defmt::write!(f, "{=istr}, {}", name, rest);
         } else {
-            defmt::intern!(", ")
-        };
-        defmt::write!(
-            f,
-            "{=istr}{=istr}{}",
-            separator,
-            name,
-            BitsFrom(register, bit + 1)
-        );
+            defmt::write!(f, "{=istr}", name);
+        }
     }
 }

@@ -39,7 +39,7 @@ fn the_boot_up_in_words() {
 }
 
 #[test]
-fn a_failure_with_its_letter_and_what_to_do() {
+fn a_failure_with_its_letter() {
     let mut b = Bench::new();
     let cause = Cause::Refused {
         at: Address::new(0x60C2, 1),
