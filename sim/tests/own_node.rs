@@ -47,7 +47,7 @@ struct Client<'i> {
 
 impl Client<'_> {
     fn now(&self) -> Instant {
-        Instant::from_micros((self.world.now().0 / 1_000_000) as u64)
+        Instant::from_micros(self.world.now().0 / 1_000_000)
     }
 
     fn say(&mut self, frame: Frame) {
