@@ -60,6 +60,9 @@ pub enum Led {
     Error,
 }
 
+/// One half-word of a program.
+pub(super) type Code = [u8; 2];
+
 const LD2: Pin = Pin::new('A', 5);
 const ERR: Pin = Pin::new('B', 0);
 const B1: Pin = Pin::new('C', 13);
@@ -155,6 +158,36 @@ impl Board {
         self.core.with_sys(|sys| {
             sys.write_word(ICER + word * 4, 1 << bit);
         });
+    }
+
+    /// The task of interrupt `irq` never ends: until the next reset its handler
+    /// begins with a branch to itself.
+    pub fn spin_irq(&mut self, irq: u8) {
+        /// Exceptions of the core come first in the vector table.
+        const FIRST: u32 = 16;
+        const VECTOR_BYTES: u32 = 4;
+        /// Of a vector: Thumb code.
+        const THUMB: u32 = 1;
+        /// `b .`
+        const BRANCH_TO_ITSELF: Code = [0xFE, 0xE7];
+        let vector = FLASH_BASE + (FIRST + u32::from(irq)) * VECTOR_BYTES;
+        let Some(handler) = self.memory.word(vector).map(|entry| entry & !THUMB) else {
+            return;
+        };
+        let mut code = Code::default();
+        if self.memory.read(handler, &mut code)
+            && self.memory.program(handler, &BRANCH_TO_ITSELF).is_ok()
+        {
+            self.spinning.push((handler, code));
+        }
+    }
+
+    /// Puts back what [`spin_irq`](Self::spin_irq) has taken away.
+    pub(super) fn stop_spinning(&mut self) {
+        for (handler, code) in self.spinning.drain(..).rev() {
+            // It could be written before.
+            let _ = self.memory.program(handler, &code);
+        }
     }
 
     /// Does not deliver interrupt `irq` from now on, or delivers it again.

@@ -7,7 +7,7 @@ use rsemu::core::device::{Device as _, ResetKind};
 use rsemu::cpu::arm::v7m::sys::Exception;
 use rsemu::cpu::arm::v7m::{ArmV7m, Config, Regs};
 
-use super::api::{BoardOptions, Stop};
+use super::api::{BoardOptions, Code, Stop};
 use super::clock::CoreClock;
 use super::diagnostics::{Diagnostic, DiagnosticKind};
 use super::fault::{FaultKind, FaultReport};
@@ -69,6 +69,8 @@ pub struct Board {
     pub(super) held: Option<(Time, ResetCause)>,
     pub(super) irq: IrqRouter,
     unrouted: Vec<(u8, u64)>,
+    /// Code that a branch to itself stands in for, with its address.
+    pub(super) spinning: Vec<(u32, Code)>,
     pub(super) measure: Measure,
     exception: u32,
     /// The IF-THEN bits of xPSR after the last step.
@@ -131,6 +133,7 @@ impl Board {
             held: None,
             irq: IrqRouter::new(),
             unrouted: Vec::new(),
+            spinning: Vec::new(),
             measure: Measure::default(),
             exception: 0,
             if_then: 0,
@@ -428,6 +431,7 @@ impl Board {
         self.core.reset(ResetKind::Cold);
         self.irq.reset();
         self.unrouted.clear();
+        self.stop_spinning();
         self.measure.reset(ResetRecord { at, cause });
         self.cycle += RESET_CYCLES;
         self.shared.cycle.store(self.cycle, Ordering::Relaxed);

@@ -5,7 +5,7 @@ use canmaster::NodeId;
 use super::stimulus::Stimulus;
 use super::{World, network, watch};
 use crate::board::Board;
-use crate::bus::WireRecord;
+use crate::bus::{PortId, WireRecord};
 use crate::drive::{DriveFault, DriveStatus, PlantState};
 use crate::log::LogLine;
 use crate::time::Time;
@@ -22,10 +22,17 @@ impl World<'_> {
             }
             Stimulus::Reset(false) => self.board.release_reset(),
             Stimulus::Hang { irq } => self.board.hang_irq(irq),
+            Stimulus::Spin { irq } => self.board.spin_irq(irq),
             Stimulus::DelayIrq { irq, max_cycles } => {
                 self.board.delay_irq(irq, max_cycles, self.scenario.seed);
             }
-            Stimulus::Silence { node } => self.silence(node),
+            Stimulus::Silence { node } => {
+                let at = self.now;
+                self.fault(node, DriveFault::HeartbeatLost { at });
+                self.fault(node, DriveFault::TpdosLost { at });
+                self.fault(node, DriveFault::SdoDead { at });
+            }
+            Stimulus::Drive { node, fault } => self.fault(node, fault),
             Stimulus::Bus(fault) => self.bus.inject(fault),
         }
     }
@@ -50,15 +57,12 @@ impl World<'_> {
         }
     }
 
-    fn silence(&mut self, node: NodeId) {
-        let at = self.now;
+    fn fault(&mut self, node: NodeId, fault: DriveFault) {
         let station = network()
             .find(node)
             .and_then(|(axis, _)| self.stations[axis].as_mut());
         if let Some(station) = station {
-            station.drive.inject(DriveFault::HeartbeatLost { at });
-            station.drive.inject(DriveFault::TpdosLost { at });
-            station.drive.inject(DriveFault::SdoDead { at });
+            station.drive.inject(fault);
         }
     }
 
@@ -128,6 +132,17 @@ impl World<'_> {
     /// The firmware's log so far.
     pub fn log(&self) -> &[(Time, LogLine)] {
         &self.log
+    }
+
+    /// Where a drive is on the bus, if it is there.
+    pub fn drive_port(&self, node: NodeId) -> Option<PortId> {
+        let (axis, _) = network().find(node)?;
+        Some(self.stations[axis].as_ref()?.port)
+    }
+
+    /// Where the board is on the bus.
+    pub fn board_port(&self) -> PortId {
+        self.board_port
     }
 
     /// The emulated board.

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use canmaster::NodeId;
 
 use crate::bus::BusFault;
+use crate::drive::DriveFault;
 use crate::time::Time;
 
 /// One thing done to the machine.
@@ -19,6 +20,12 @@ pub enum Stimulus {
         /// Its number.
         irq: u8,
     },
+    /// The next task that an interrupt of the board starts never ends, until the
+    /// next reset: what has a lower priority waits for ever.
+    Spin {
+        /// Its number.
+        irq: u8,
+    },
     /// An interrupt of the board is taken late.
     DelayIrq {
         /// Its number.
@@ -30,6 +37,13 @@ pub enum Stimulus {
     Silence {
         /// Which.
         node: NodeId,
+    },
+    /// A drive gets a fault; moments that have passed mean now.
+    Drive {
+        /// Which.
+        node: NodeId,
+        /// What.
+        fault: DriveFault,
     },
     /// The bus gets a fault.
     Bus(BusFault),

@@ -56,9 +56,20 @@ pub fn reset_in_motion(
 /// watchdog resets it. They come to rest, and nothing moves until the button is
 /// pressed again.
 pub fn hang_in_motion(image: &Image, seed: u64, irq: u8) -> Result<(), TrialError> {
+    watchdog_in_motion(image, seed, Stimulus::Hang { irq })
+}
+
+/// The task of interrupt `irq` never ends while all axes move: the watchdog
+/// resets the board. They come to rest, and nothing moves until the button is
+/// pressed again.
+pub fn spin_in_motion(image: &Image, seed: u64, irq: u8) -> Result<(), TrialError> {
+    watchdog_in_motion(image, seed, Stimulus::Spin { irq })
+}
+
+fn watchdog_in_motion(image: &Image, seed: u64, stimulus: Stimulus) -> Result<(), TrialError> {
     let mut world = moving(image, seed)?;
     let resets = world.board().stats().resets.len();
-    world.apply(Stimulus::Hang { irq });
+    world.apply(stimulus);
     let limit = world.now() + WATCHDOG_BY;
     let bitten = world.run_to(limit, |world| world.board().stats().resets.len() > resets);
     must(&world, bitten, "the watchdog has not reset the board")?;

@@ -1,0 +1,213 @@
+//! Something goes wrong while all axes move: every axis comes to rest, judged
+//! in the plant, and nothing moves afterwards, not even if the button is
+//! pressed; the reason names who and what.
+
+mod common;
+
+use canmaster::emcy::{Emcy, EmcyCode, ErrorRegister};
+use canmaster::nmt::{self, Command, NodeControl};
+use canmaster::{Frame, NodeId};
+use canmaster_sim::board::irqs;
+use canmaster_sim::bus::BusFault;
+use canmaster_sim::drive::{DriveFault, cia402};
+use canmaster_sim::judge::{Outcome, STANDSTILL_RPM};
+use canmaster_sim::time::Time;
+use canmaster_sim::world::trials::{moving, spin_in_motion};
+use canmaster_sim::world::{Record, Stimulus, World, round_trip};
+
+use common::image;
+
+const NODE: NodeId = NodeId::constant::<4>();
+const OVERCURRENT: u16 = 0x2310;
+const NO_ERROR: u16 = 0;
+/// Every axis stands by then.
+const STOPPED_BY: Time = Time::from_ms(2000);
+/// How long nothing must move after that.
+const WATCHED: Time = Time::from_ms(700);
+
+/// Does `harm` while all axes move and watches what comes of it. Every axis but
+/// that of `spared`, which may coast, is at rest in time; all are in the end.
+fn struck(seed: u64, spared: Option<NodeId>, harm: impl FnOnce(&mut World<'_>)) -> Record {
+    let mut world = moving(image(), seed).unwrap().with_guest();
+    let struck = world.now();
+    harm(&mut world);
+    world.run_to(struck + STOPPED_BY, World::at_rest);
+    world.press();
+    world.run_until(world.now() + WATCHED);
+    let record = world.finish();
+    for axis in &record.axes {
+        let node = axis.node.get();
+        let stopped = axis.motion.stopped().expect("it was in motion");
+        let in_time = stopped < struck + STOPPED_BY;
+        assert!(
+            in_time || spared == Some(axis.node),
+            "node {node}: {stopped}"
+        );
+        assert!(axis.motion.at_rest(), "node {node} turns");
+        let last = axis.motion.last().unwrap();
+        assert!(last.velocity.abs() <= STANDSTILL_RPM, "node {node}");
+        let movements = axis.motion.movements().len();
+        assert_eq!(movements, 1, "node {node} moved again");
+        assert_eq!(axis.motion.unreleased(), None, "node {node}");
+    }
+    assert_eq!(record.releases.len(), 1, "it was ready again");
+    record
+}
+
+#[track_caller]
+fn assert_failed(record: &Record, words: &[&str]) {
+    let verdict = &record.verdict;
+    assert_eq!(verdict.outcome, Outcome::Failed, "{}", verdict.reason);
+    let reason = verdict.reason.to_lowercase();
+    for word in words {
+        assert!(reason.contains(word), "`{word}` is missing in: {reason}");
+    }
+}
+
+#[track_caller]
+fn assert_logged(record: &Record, words: &str) {
+    let lines = record.log.iter().map(|(_, line)| line.to_string());
+    let lines: Vec<String> = lines.collect();
+    let found = lines.iter().any(|line| line.contains(words));
+    assert!(found, "`{words}` is missing in:\n{}", lines.join("\n"));
+}
+
+fn state(record: &Record, node: NodeId) -> cia402::State {
+    let axis = record.axes.iter().find(|axis| axis.node == node);
+    axis.and_then(|axis| axis.status.as_ref()).unwrap().state
+}
+
+fn last_emcy(record: &Record, node: NodeId) -> Option<u16> {
+    let axis = record.axes.iter().find(|axis| axis.node == node);
+    axis.and_then(|axis| axis.status.as_ref())?.last_emcy
+}
+
+/// A frame of somebody whom the network does not know.
+fn say(world: &mut World<'_>, frame: Frame) {
+    assert!(world.say(frame.into()));
+}
+
+#[test]
+fn an_error_of_one_drive_stops_all() {
+    let record = struck(31, Some(NODE), |world| {
+        let (at, code) = (world.now(), OVERCURRENT);
+        let until = None;
+        let fault = DriveFault::Error { at, code, until };
+        world.apply(Stimulus::Drive { node: NODE, fault });
+    });
+    assert_failed(&record, &["node 4"]);
+    assert_logged(&record, "node 4: emergency 2310h (overcurrent)");
+    assert_eq!(state(&record, NODE), cia402::State::Fault);
+}
+
+#[test]
+fn a_warning_and_its_end_stop_nobody() {
+    let mut world = moving(image(), 32).unwrap();
+    let at = world.now();
+    let until = Some(at + Time::from_ms(100));
+    let code = EmcyCode::EPOS4_OVERLOAD.0;
+    let fault = DriveFault::Error { at, code, until };
+    world.apply(Stimulus::Drive { node: NODE, fault });
+    let limit = at + round_trip().unwrap() + Time::from_ms(1000);
+    let done = world.run_to(limit, |world| world.round_trips() == (1, false));
+    assert!(done, "the round trip does not end");
+    let record = world.finish();
+    assert_eq!(
+        record.verdict.outcome,
+        Outcome::Ok,
+        "{}",
+        record.verdict.reason
+    );
+    assert_logged(&record, "node 4: emergency FF01h (system overloaded)");
+    assert_logged(&record, "node 4: emergency 0000h");
+    assert_eq!(last_emcy(&record, NODE), Some(NO_ERROR));
+}
+
+#[test]
+fn an_emergency_of_unknown_meaning_is_a_fault() {
+    /// Of no range that a standard or the drive's manual names.
+    const UNKNOWN: EmcyCode = EmcyCode(0x1234);
+    // The drive itself knows nothing of it: the master has to stop it too.
+    let record = struck(33, None, |world| {
+        let emcy = Emcy::new(UNKNOWN, ErrorRegister::GENERIC);
+        say(world, emcy.frame(NODE));
+    });
+    assert_failed(&record, &["node 4", "1234h", "unknown"]);
+    for axis in &record.axes {
+        assert_eq!(last_emcy(&record, axis.node), None);
+    }
+}
+
+#[test]
+fn a_lost_heartbeat_stops_all_although_process_data_go_on() {
+    let record = struck(34, None, |world| {
+        let at = world.now();
+        let fault = DriveFault::HeartbeatLost { at };
+        world.apply(Stimulus::Drive { node: NODE, fault });
+    });
+    assert_failed(&record, &["node 4", "heartbeat lost"]);
+    assert_eq!(last_emcy(&record, NODE), None);
+}
+
+#[test]
+fn after_a_power_cycle_of_a_drive_nothing_moves() {
+    let record = struck(35, Some(NODE), |world| {
+        let off = world.now();
+        let on = off + Time::from_ms(20);
+        let fault = DriveFault::PowerCycle { off, on };
+        world.apply(Stimulus::Drive { node: NODE, fault });
+    });
+    assert_failed(&record, &["node 4"]);
+    let axis = record.axes.iter().find(|axis| axis.node == NODE).unwrap();
+    let status = axis.status.as_ref().unwrap();
+    assert_eq!(status.nmt, nmt::State::PreOperational, "it has booted");
+    assert_ne!(status.state, cia402::State::OperationEnabled);
+}
+
+#[test]
+fn another_master_that_stops_a_node_stops_all() {
+    let record = struck(36, None, |world| {
+        let node = NodeId::constant::<2>();
+        say(world, NodeControl::node(Command::Stop, node).frame());
+    });
+    assert_failed(&record, &["node 2"]);
+    assert_logged(&record, "node 2: went to NMT");
+}
+
+#[test]
+fn a_cut_cable_stops_all_for_good() {
+    // The board alone, one drive alone.
+    let cuts = [
+        |world: &World<'_>| Some(world.board_port()),
+        |world: &World<'_>| world.drive_port(NODE),
+    ];
+    for (seed, isolated) in (38..).zip(cuts) {
+        let record = struck(seed, None, |world| {
+            let isolated = isolated(world);
+            let from = world.now();
+            let until = from + Time::from_ms(400);
+            world.apply(Stimulus::Bus(BusFault::Cut {
+                isolated,
+                from,
+                until,
+            }));
+        });
+        assert_failed(&record, &[]);
+    }
+}
+
+#[test]
+fn a_short_circuit_of_the_bus_stops_all_for_good() {
+    let record = struck(41, None, |world| {
+        let from = world.now();
+        let until = from + Time::from_ms(50);
+        world.apply(Stimulus::Bus(BusFault::StuckDominant { from, until }));
+    });
+    assert_failed(&record, &[]);
+}
+
+#[test]
+fn a_task_that_never_ends_is_found_by_the_watchdog() {
+    // Nothing interrupts that of the SYNC.
+    spin_in_motion(image(), 42, irqs::TIM2).unwrap_or_else(|error| panic!("{error}"));
+}
