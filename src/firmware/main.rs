@@ -23,8 +23,6 @@ mod log;
 #[cfg(target_os = "none")]
 mod own_node;
 #[cfg(target_os = "none")]
-mod panic;
-#[cfg(target_os = "none")]
 mod report;
 #[cfg(target_os = "none")]
 mod roll;
