@@ -3,7 +3,7 @@
 //! [`setup`] consumes the peripherals once and hands back configured devices:
 //! clocks at 170 MHz, FDCAN1 on PA11/PA12, a period timer with a compare, a
 //! millisecond tick, a microsecond clock, two LEDs, the button, the watchdog,
-//! and what caused the last reset.
+//! the second bank of the flash as storage, and what caused the last reset.
 //!
 //! The crate knows nothing of any protocol above CAN: frames are
 //! `embedded_can::Frame`. It is the only place with `unsafe` code; each block
@@ -13,6 +13,7 @@
 
 pub mod can;
 pub mod clock;
+pub mod flash;
 pub mod pins;
 pub mod reset_cause;
 mod serial_number;
@@ -70,6 +71,8 @@ pub struct Devices {
     pub error_led: pins::ErrorLed,
     /// B1, the blue button.
     pub button: pins::Button,
+    /// Bank 2 of the flash, or why nothing can be stored in it.
+    pub storage: Result<flash::Storage, flash::Unavailable>,
     /// The independent watchdog, already running.
     pub watchdog: watchdog::Watchdog,
 }
@@ -126,6 +129,7 @@ pub fn setup(peripherals: pac::Peripherals, config: &Config) -> Devices {
         run_led: pins.run_led,
         error_led: pins.error_led,
         button: pins.button,
+        storage: flash::setup(peripherals.FLASH),
         watchdog,
     }
 }

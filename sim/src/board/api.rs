@@ -4,6 +4,7 @@ use std::sync::atomic::Ordering;
 
 use super::diagnostics::Diagnostic;
 use super::fault::FaultReport;
+use super::flash::{BankContents, FlashOptions};
 use super::gpio::Pin;
 use super::image::ImageSize;
 use super::machine::Board;
@@ -24,6 +25,8 @@ pub struct BoardOptions {
     pub lsi_error_percent: f64,
     /// COB-ID whose request after TIM2's update is timed.
     pub sync_cob_id: u16,
+    /// The flash: its option bytes and what bank 2 holds.
+    pub flash: FlashOptions,
 }
 
 impl Default for BoardOptions {
@@ -34,6 +37,7 @@ impl Default for BoardOptions {
             hsi_error_percent: 0.0,
             lsi_error_percent: 0.0,
             sync_cob_id: SYNC,
+            flash: FlashOptions::default(),
         }
     }
 }
@@ -175,9 +179,7 @@ impl Board {
             return;
         };
         let mut code = Code::default();
-        if self.memory.read(handler, &mut code)
-            && self.memory.program(handler, &BRANCH_TO_ITSELF).is_ok()
-        {
+        if self.memory.read(handler, &mut code) && self.memory.patch(handler, &BRANCH_TO_ITSELF) {
             self.spinning.push((handler, code));
         }
     }
@@ -186,7 +188,7 @@ impl Board {
     pub(super) fn stop_spinning(&mut self) {
         for (handler, code) in self.spinning.drain(..).rev() {
             // It could be written before.
-            let _ = self.memory.program(handler, &code);
+            let _ = self.memory.patch(handler, &code);
         }
     }
 
@@ -220,11 +222,21 @@ impl Board {
         self.memory.word(address)
     }
 
+    /// What bank 2 of the flash holds, for the [`FlashOptions`] of another
+    /// board: it outlives resets and the supply. What is being erased or
+    /// programmed shows as it was before.
+    #[must_use]
+    pub fn bank2(&self) -> BankContents {
+        lock(&self.soc).bank2()
+    }
+
     /// Starts all figures anew, except the stack's and the resets.
     pub fn clear_stats(&mut self) {
         self.measure.clear();
         self.stats_from = self.cycle;
-        lock(&self.soc).sync.clear();
+        let mut soc = lock(&self.soc);
+        soc.sync.clear();
+        soc.clear_flash_figures();
     }
 
     /// What has been measured.
@@ -239,6 +251,7 @@ impl Board {
             let soc = lock(&self.soc);
             stats.sync = soc.sync.figures();
             stats.rx_overruns = soc.can_lost();
+            stats.flash = soc.flash_figures();
         }
         let top = self.memory.word(FLASH_BASE).unwrap_or(0);
         let bottom = self.image.stack_bottom(top);

@@ -1,23 +1,27 @@
 //! The board: core, memories and peripherals run together.
 
+mod pause;
+mod reset;
+mod routing;
+
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
-use rsemu::core::device::{Device as _, ResetKind};
 use rsemu::cpu::arm::v7m::sys::Exception;
 use rsemu::cpu::arm::v7m::{ArmV7m, Config, Regs};
 
 use super::api::{BoardOptions, Code, Stop};
 use super::clock::CoreClock;
-use super::diagnostics::{Diagnostic, DiagnosticKind};
+use super::diagnostics::Diagnostic;
 use super::fault::{FaultKind, FaultReport};
+use super::flash::Flash;
 use super::image::{BoardError, Image};
-use super::irq::{IrqRouter, bits};
+use super::irq::IrqRouter;
 use super::measure::{Measure, ResetRecord};
 use super::memory::{FLASH_BASE, Memory, Shared, lock};
 use super::rcc::ResetCause;
 use super::rtt;
-use super::soc::{ClockErrors, Soc, TIM2_IRQ, irq_name};
+use super::soc::{ClockErrors, Soc, TIM2_IRQ};
 use crate::time::Time;
 
 /// STM32G4 implements four priority bits.
@@ -26,12 +30,6 @@ const PRIORITY_BITS: u8 = 4;
 /// emptied, in cycles.
 const POLL_CYCLES: u64 = 3_400;
 const RTT_CYCLES: u64 = 85_000;
-/// From the reset condition to the first instruction (data sheet, reset
-/// temporisation), in cycles of HSI.
-const RESET_CYCLES: u64 = 800;
-/// A line that is high for this long without being enabled in the NVIC is
-/// taken for a mistake.
-const ROUTING_CYCLES: u64 = 1_700_000;
 /// The emulator charges the eight data accesses of stacking on top of the
 /// twelve cycles that stacking takes as a whole, and those of unstacking on top
 /// of the ten; a step that changes the active exception and takes this long
@@ -61,6 +59,8 @@ pub struct Board {
     next_poll: u64,
     next_rtt: u64,
     asleep: bool,
+    /// The core waits for the flash until this cycle.
+    stalled_until: u64,
     locked: bool,
     /// Something may have woken the core.
     poke: bool,
@@ -102,19 +102,24 @@ impl Board {
             hsi_ppb: (options.hsi_error_percent * PPB_PER_PERCENT) as i64,
             lsi_ppb: (options.lsi_error_percent * PPB_PER_PERCENT) as i64,
         };
-        let soc = Soc::new(errors, options.sync_cob_id);
+        let mut soc = Soc::new(errors, options.sync_cob_id, Flash::new(&options.flash));
+        for (address, bytes) in &image.segments {
+            if !soc.load_flash(address - FLASH_BASE, bytes) {
+                return Err(BoardError::Segment {
+                    address: *address,
+                    len: bytes.len(),
+                });
+            }
+        }
         let clock = soc.clock;
         let soc = Arc::new(Mutex::new(soc));
         let shared = Arc::new(Shared::default());
-        let (memory, space) = Memory::new(&soc, &shared)?;
-        for (address, bytes) in &image.segments {
-            memory.program(*address, bytes)?;
-        }
+        let memory = Memory::new(&soc, &shared)?;
         let config = Config::CORTEX_M4F
             .with_reset_vtor(FLASH_BASE)
             .with_priority_bits(PRIORITY_BITS);
         let core = ArmV7m::new(config);
-        core.attach_space(Arc::new(space));
+        core.attach_space(memory.space());
         let mut board = Self {
             core,
             soc,
@@ -127,6 +132,7 @@ impl Board {
             next_poll: 0,
             next_rtt: 0,
             asleep: false,
+            stalled_until: 0,
             locked: false,
             poke: false,
             in_fault: false,
@@ -184,6 +190,10 @@ impl Board {
             if self.cycle >= target {
                 return Stop::Reached;
             }
+            if self.cycle < self.stalled_until {
+                self.stall_to(self.next_event.min(target));
+                continue;
+            }
             if self.asleep && !self.poke {
                 self.sleep_to(self.next_event.min(target));
                 continue;
@@ -214,6 +224,9 @@ impl Board {
         self.cycle += used;
         self.shared.cycle.store(self.cycle, Ordering::Relaxed);
         self.shared.pc.store(pc, Ordering::Relaxed);
+        if self.shared.stall.load(Ordering::Relaxed) != 0 {
+            self.begin_stall(used);
+        }
         if regs.basepri != self.basepri {
             self.basepri = regs.basepri;
             let exception = Exception(u16::from(TIM2_IRQ) + Exception::IRQ0.0);
@@ -293,40 +306,6 @@ impl Board {
         Some(Stop::Fault(Box::new(report)))
     }
 
-    /// Passes over the cycles in which the core sleeps.
-    fn sleep_to(&mut self, cycle: u64) {
-        const ENABLE: u32 = 1 << 0;
-        const TICKINT: u32 = 1 << 1;
-        let mut cycles = cycle.saturating_sub(self.cycle);
-        if self.locked {
-            self.cycle += cycles;
-            return;
-        }
-        // SysTick counts on in sleep; the core only ticks it while it steps.
-        let (woken, skipped) = self.core.with_sys(|sys| {
-            if sys.syst_csr & ENABLE == 0 {
-                return (false, cycles);
-            }
-            let wraps = sys.syst_csr & TICKINT != 0;
-            let left = match sys.syst_cvr {
-                0 => u64::from(sys.syst_rvr) + 1,
-                value => u64::from(value),
-            };
-            if wraps {
-                cycles = cycles.min(left);
-            }
-            let wrapped = sys.tick_systick(cycles) && wraps;
-            if wrapped {
-                sys.set_pending(Exception::SYSTICK, true);
-            }
-            (wrapped, cycles)
-        });
-        self.cycle += skipped;
-        self.measure.slept(skipped);
-        self.shared.cycle.store(self.cycle, Ordering::Relaxed);
-        self.poke |= woken;
-    }
-
     /// Brings the peripherals up to date and the core's interrupt inputs with
     /// them. True if a bus may be concerned.
     fn service(&mut self) -> bool {
@@ -349,6 +328,12 @@ impl Board {
             .irq
             .update(soc.irq_levels(), self.cycle, raised, &self.core);
         self.poke |= up != 0;
+        if soc.take_nmi() {
+            self.core
+                .with_sys(|sys| sys.set_pending(Exception::NMI, true));
+            self.poke = true;
+        }
+        self.memory.set_bank1_plain(soc.flash().bank1_is_plain());
         self.clock = soc.clock;
         self.next_event = soc.next_event().min(self.irq.next_delivery());
         let changed = soc.take_can_changed();
@@ -368,38 +353,6 @@ impl Board {
         changed
     }
 
-    /// Notes lines that stay high while the NVIC does not enable them.
-    fn watch_routing(&mut self, up: u128) {
-        let enabled = |irq: u8| {
-            let exception = Exception(u16::from(irq) + Exception::IRQ0.0);
-            self.core.with_sys(|sys| sys.is_enabled(exception))
-        };
-        for irq in bits(up) {
-            if !enabled(irq) && !self.unrouted.iter().any(|(known, _)| *known == irq) {
-                self.unrouted.push((irq, self.cycle + ROUTING_CYCLES));
-            }
-        }
-        if self.unrouted.is_empty() {
-            return;
-        }
-        let (cycle, driven) = (self.cycle, self.irq.driven());
-        self.unrouted
-            .retain(|&(irq, _)| driven & 1 << irq != 0 && !enabled(irq));
-        let at = self.clock.time_of(cycle);
-        for &(irq, deadline) in &self.unrouted {
-            if deadline <= cycle {
-                let text = format!(
-                    "interrupt {} is requested, but the NVIC does not enable it: nobody serves it",
-                    irq_name(irq)
-                );
-                lock(&self.soc)
-                    .log
-                    .note(at, 0, DiagnosticKind::InterruptRouting, text);
-            }
-        }
-        self.unrouted.retain(|&(_, deadline)| deadline > cycle);
-    }
-
     fn read_diagnostics(&mut self) {
         let soc = lock(&self.soc);
         let total = soc.log.total();
@@ -414,35 +367,5 @@ impl Board {
         if let Some(block) = self.image.rtt {
             rtt::drain(&self.memory, block, &mut self.rtt_out);
         }
-    }
-
-    /// Resets core and peripherals at `at`.
-    pub(super) fn reset(&mut self, cause: ResetCause, at: Time) {
-        self.read_rtt();
-        if cause == ResetCause::PowerOn {
-            self.memory.power_on();
-        }
-        let mut soc = lock(&self.soc);
-        soc.reset(cause, self.cycle, at);
-        self.clock = soc.clock;
-        drop(soc);
-        // A warm reset of the core leaves NVIC enables, priorities and SCB as
-        // they were; the hardware resets them. A cold one starts afresh.
-        self.core.reset(ResetKind::Cold);
-        self.irq.reset();
-        self.unrouted.clear();
-        self.stop_spinning();
-        self.measure.reset(ResetRecord { at, cause });
-        self.cycle += RESET_CYCLES;
-        self.shared.cycle.store(self.cycle, Ordering::Relaxed);
-        self.next_event = self.cycle;
-        self.next_poll = 0;
-        self.asleep = false;
-        self.locked = false;
-        self.in_fault = false;
-        self.exception = 0;
-        self.if_then = 0;
-        self.basepri = 0;
-        self.pc = 0;
     }
 }

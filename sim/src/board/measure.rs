@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use rsemu::cpu::arm::v7m::sys::Exception;
 use rsemu::cpu::arm::v7m::{ArmV7m, Regs};
 
+use super::flash::FlashFigures;
 use super::irq::IrqRouter;
 use super::rcc::ResetCause;
 use super::soc::irq_name;
@@ -77,6 +78,8 @@ pub struct BoardStats {
     pub stack_size_bytes: u32,
     /// Frames lost in full Rx FIFOs of FDCAN1..3.
     pub rx_overruns: [u64; 3],
+    /// What the flash has been through.
+    pub flash: FlashFigures,
     /// Resets, power-on included.
     pub resets: Vec<ResetRecord>,
 }
@@ -172,6 +175,14 @@ impl Measure {
             if let Some(since) = &mut section.since {
                 *since += cycles;
             }
+        }
+    }
+
+    /// The core waits for the flash within the step that it made last.
+    pub(super) fn stalled(&mut self, cycles: u64) {
+        self.busy += cycles;
+        if let Some(frame) = self.stack.last_mut() {
+            frame.own_cycles += cycles;
         }
     }
 

@@ -1,17 +1,18 @@
 //! Flash, SRAM and CCM, and the space that the core sees.
 
 use rsemu::core::space::{
-    AddressSpace, DispatchPolicy, MemAttrs, MemOps, MemResult, Perms, RamStore, Region,
+    AccessConstraints, AddressSpace, DispatchPolicy, Mapping, MappingId, MemAttrs, MemOps,
+    MemResult, Perms, RamStore, Region,
 };
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 
+use super::flash::{BANK_BYTES, FLASH_BYTES};
 use super::image::BoardError;
 use super::soc::{Access, Soc};
 
 pub(super) const FLASH_BASE: u32 = 0x0800_0000;
-const FLASH_BYTES: u64 = 512 * 1024;
-pub(super) const FLASH_END: u64 = FLASH_BASE as u64 + FLASH_BYTES;
+pub(super) const FLASH_END: u64 = FLASH_BASE as u64 + FLASH_BYTES as u64;
 /// SRAM1, SRAM2 and, at its end, the alias of CCM.
 const SRAM_BASE: u32 = 0x2000_0000;
 const SRAM_BYTES: u64 = 128 * 1024;
@@ -60,8 +61,22 @@ pub(super) const fn same_ram(a: u32, b: u32) -> bool {
 pub(super) struct Shared {
     pub(super) cycle: AtomicU64,
     pub(super) pc: AtomicU32,
-    /// A write concerned interrupts, deadlines or the bus.
+    /// An access concerned interrupts, deadlines or the bus.
     pub(super) dirty: AtomicBool,
+    /// For how many cycles the instruction's accesses to the flash wait.
+    pub(super) stall: AtomicU64,
+}
+
+impl Shared {
+    /// The access of the instruction that runs. A store reaches the peripheral
+    /// in its second cycle.
+    fn access(&self) -> Access {
+        const INTO_THE_INSTRUCTION: u64 = 2;
+        Access {
+            cycle: self.cycle.load(Ordering::Relaxed) + INTO_THE_INSTRUCTION,
+            pc: self.pc.load(Ordering::Relaxed),
+        }
+    }
 }
 
 /// A window of peripheral registers.
@@ -79,14 +94,8 @@ pub(super) fn lock(soc: &Mutex<Soc>) -> MutexGuard<'_, Soc> {
 }
 
 impl Window {
-    /// The access of the instruction that runs. A store reaches the peripheral
-    /// in its second cycle.
     fn access(&self) -> Access {
-        const INTO_THE_INSTRUCTION: u64 = 2;
-        Access {
-            cycle: self.shared.cycle.load(Ordering::Relaxed) + INTO_THE_INSTRUCTION,
-            pc: self.shared.pc.load(Ordering::Relaxed),
-        }
+        self.shared.access()
     }
 }
 
@@ -125,27 +134,58 @@ impl MemOps for Window {
     }
 }
 
+/// The flash behind its interface: what is not plain reading of bank 1.
+#[derive(Debug)]
+struct FlashWindow {
+    soc: Arc<Mutex<Soc>>,
+    shared: Arc<Shared>,
+}
+
+impl MemOps for FlashWindow {
+    fn read(&self, offset: u64, dst: &mut [u8], _attrs: MemAttrs) -> MemResult {
+        let access = self.shared.access();
+        let mut soc = lock(&self.soc);
+        let stall = soc.read_flash(offset as u32, dst, access);
+        // Accesses of one instruction wait for the same operation.
+        let stall = stall.max(self.shared.stall.load(Ordering::Relaxed));
+        self.shared.stall.store(stall, Ordering::Relaxed);
+        if soc.flash().has_nmi() {
+            self.shared.dirty.store(true, Ordering::Relaxed);
+        }
+        Ok(())
+    }
+
+    fn write(&self, offset: u64, src: &[u8], _attrs: MemAttrs) -> MemResult {
+        let access = self.shared.access();
+        lock(&self.soc).write_flash(offset as u32, src, access);
+        self.shared.dirty.store(true, Ordering::Relaxed);
+        Ok(())
+    }
+
+    fn constraints(&self) -> AccessConstraints {
+        AccessConstraints::ANY
+    }
+}
+
 /// The memories.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(super) struct Memory {
     flash: Arc<RamStore>,
     sram: Arc<RamStore>,
+    space: Arc<AddressSpace>,
+    /// Plain reading of bank 1 and whether it is allowed.
+    bank1: (MappingId, bool),
 }
 
 impl Memory {
-    /// Builds the map, with erased flash and RAM as after power-on.
-    pub(super) fn new(
-        soc: &Arc<Mutex<Soc>>,
-        shared: &Arc<Shared>,
-    ) -> Result<(Self, AddressSpace), BoardError> {
+    /// Builds the map, with RAM as after power-on.
+    pub(super) fn new(soc: &Arc<Mutex<Soc>>, shared: &Arc<Shared>) -> Result<Self, BoardError> {
         const PAGE_BITS: u32 = 12;
         /// The table covers everything up to the last peripheral window.
         const TABLE_END: u64 = 0x5010_0000;
         let refused = |error: rsemu::core::Error| BoardError::Map(error.to_string());
-        let memory = Self {
-            flash: Arc::new(RamStore::new(FLASH_BYTES)),
-            sram: Arc::new(RamStore::new(SRAM_BYTES)),
-        };
+        let flash = lock(soc).flash().store();
+        let sram = Arc::new(RamStore::new(SRAM_BYTES));
         let space =
             AddressSpace::new("STM32G474", u32::BITS).with_dispatch(DispatchPolicy::Dense {
                 page_bits: PAGE_BITS,
@@ -153,15 +193,26 @@ impl Memory {
             });
         let signature = Arc::new(RamStore::new(SIGNATURE_BYTES));
         fill_signature(&signature).map_err(|error| BoardError::Map(format!("{error:?}")))?;
-        {
+        let bank1 = {
             let mut map = space.topology();
-            let flash = Region::ram("flash", Arc::clone(&memory.flash));
-            map.map_with_perms(flash, u64::from(FLASH_BASE), Perms::RX)
-                .map_err(refused)?;
+            let window = FlashWindow {
+                soc: Arc::clone(soc),
+                shared: Arc::clone(shared),
+            };
+            let window = Region::io("flash", u64::from(FLASH_BYTES), Arc::new(window));
+            map.map(window, u64::from(FLASH_BASE)).map_err(refused)?;
+            // Before it, for reading only: the program, as fast as can be.
+            let bank1 = Arc::new(Region::ram("flash", Arc::clone(&flash)));
+            let bank1 =
+                Region::alias("bank 1", bank1, 0, u64::from(BANK_BYTES)).map_err(refused)?;
+            let bank1 = Mapping::new(bank1, u64::from(FLASH_BASE))
+                .with_perms(Perms::RX)
+                .with_priority(1);
+            let bank1 = map.map_with(bank1).map_err(refused)?;
             let signature = Region::ram("signature", signature);
             map.map_with_perms(signature, u64::from(SIGNATURE_BASE), Perms::RX)
                 .map_err(refused)?;
-            let sram = Arc::new(Region::ram("sram", Arc::clone(&memory.sram)));
+            let sram = Arc::new(Region::ram("sram", Arc::clone(&sram)));
             let ccm = Region::alias("ccm", Arc::clone(&sram), SRAM_BYTES - CCM_BYTES, CCM_BYTES)
                 .map_err(refused)?;
             map.map(sram, u64::from(SRAM_BASE)).map_err(refused)?;
@@ -175,11 +226,31 @@ impl Memory {
                 map.map(Region::io(name, len, Arc::new(window)), u64::from(base))
                     .map_err(refused)?;
             }
-        }
+            bank1
+        };
+        let memory = Self {
+            flash,
+            sram,
+            space: Arc::new(space),
+            bank1: (bank1, true),
+        };
         memory.power_on();
-        let erased = memory.flash.fill(0, FLASH_BYTES, 0xFF);
-        erased.map_err(|error| BoardError::Map(format!("{error:?}")))?;
-        Ok((memory, space))
+        Ok(memory)
+    }
+
+    /// What the core sees.
+    pub(super) fn space(&self) -> Arc<AddressSpace> {
+        Arc::clone(&self.space)
+    }
+
+    /// Lets bank 1 be read directly, or only through its interface.
+    pub(super) fn set_bank1_plain(&mut self, plain: bool) {
+        if self.bank1.1 != plain {
+            self.bank1.1 = plain;
+            let perms = if plain { Perms::RX } else { Perms::NONE };
+            let done = self.space.topology().reprotect(self.bank1.0, perms);
+            debug_assert!(done.is_ok(), "the mapping stays for good");
+        }
     }
 
     /// RAM loses what it held.
@@ -188,14 +259,11 @@ impl Memory {
         let _ = self.sram.fill(0, SRAM_BYTES, POWER_ON_BYTE);
     }
 
-    /// Puts bytes into the flash, as a programmer does.
-    pub(super) fn program(&self, address: u32, bytes: &[u8]) -> Result<(), BoardError> {
-        self.flash
-            .write_at(u64::from(address - FLASH_BASE), bytes)
-            .map_err(|_| BoardError::Segment {
-                address,
-                len: bytes.len(),
-            })
+    /// Puts other code into the flash, as no program could; false if it does not
+    /// fit.
+    pub(super) fn patch(&self, address: u32, bytes: &[u8]) -> bool {
+        let offset = u64::from(address.wrapping_sub(FLASH_BASE));
+        self.flash.write_at(offset, bytes).is_ok()
     }
 
     /// Reads bytes of flash or RAM; false where there is neither.

@@ -8,9 +8,8 @@
 //! hardware would not take becomes a [`Diagnostic`].
 //!
 //! What it cannot tell: analogue behaviour, transceivers, real oscillators
-//! starting up, flash wait states, erasing and programming of the flash. The
-//! address 0, where the hardware shows an alias of the flash, holds nothing, so
-//! that a null pointer faults.
+//! starting up, flash wait states. The address 0, where the hardware shows an
+//! alias of the flash, holds nothing, so that a null pointer faults.
 //!
 //! `rsemu` is built without its `std` feature: its locks are then plain flags
 //! that never wait, which is all that a board, owned by one thread at a time,
@@ -47,6 +46,7 @@ pub use api::{BoardOptions, Led, Stop};
 pub use diagnostics::{Diagnostic, DiagnosticKind};
 pub use fault::{FaultKind, FaultReport};
 pub use fdcan::REQUEST_TO_START_CLOCKS;
+pub use flash::{BankContents, FlashFigures, FlashOptions};
 pub use image::{BoardError, ImageSize};
 pub use machine::Board;
 pub use measure::{BoardStats, IrqStats, ResetRecord};
@@ -55,6 +55,8 @@ pub use sync_probe::SyncFigures;
 
 /// Interrupt numbers of the STM32G474 for fault injection and figures.
 pub mod irqs {
+    /// FLASH: end of operation, error.
+    pub const FLASH: u8 = 4;
     /// FDCAN1, line 0.
     pub const FDCAN1_IT0: u8 = 21;
     /// FDCAN1, line 1.

@@ -2,6 +2,7 @@
 
 mod access;
 mod can;
+mod flash;
 
 use super::clock::{CoreClock, Frequency};
 use super::diagnostics::{DiagnosticKind, DiagnosticLog};
@@ -31,6 +32,8 @@ const TIM3: usize = 1;
 pub(crate) const TIM2_IRQ: u8 = 28;
 /// Interrupts IT0 and IT1 of FDCAN1..3.
 const CAN_IRQS: [[u8; 2]; 3] = [[21, 22], [86, 87], [88, 89]];
+/// FLASH's interrupt: end of operation, error.
+const FLASH_IRQ: u8 = 4;
 /// DBGMCU_IDCODE of an STM32G47x/G48x, revision X.
 const IDCODE: u32 = 0x2001_6469;
 const DBGMCU_WORDS: usize = 5;
@@ -79,7 +82,7 @@ pub(crate) struct Soc {
 impl Soc {
     /// Power-on at time zero.
     #[must_use]
-    pub(crate) fn new(errors: ClockErrors, sync_cob_id: u16) -> Self {
+    pub(crate) fn new(errors: ClockErrors, sync_cob_id: u16, flash: Flash) -> Self {
         const HSE_HZ: u32 = 24_000_000;
         let oscillators = Oscillators {
             hse: Frequency::from_hz(HSE_HZ).with_error_ppb(errors.hse_ppb),
@@ -90,7 +93,7 @@ impl Soc {
             clock: CoreClock::new(oscillators.hsi, 0, Time::ZERO),
             rcc: Rcc::new(oscillators, ResetCause::PowerOn, 0),
             pwr: Pwr::default(),
-            flash: Flash::default(),
+            flash,
             ports: std::array::from_fn(Port::new),
             exti: Exti::default(),
             timers: TIMER_KINDS.map(|(kind, _, _)| Timer::new(kind, 0)),
@@ -124,7 +127,7 @@ impl Soc {
         self.rcc = Rcc::new(oscillators, cause, flags);
         self.clock = CoreClock::new(self.rcc.hclk(), cycle, time);
         self.pwr = Pwr::default();
-        self.flash = Flash::default();
+        self.flash.reset(time);
         for (index, port) in self.ports.iter_mut().enumerate() {
             port.reset(index);
         }
@@ -155,6 +158,7 @@ impl Soc {
         let (updates, last) = self.timers[TIM2].updates();
         self.sync.note_updates(updates, last);
         let now = self.clock.time_of(cycle);
+        self.flash.advance(now);
         if self.iwdg.expires().is_some_and(|at| at <= now) {
             self.reset_request = Some(ResetCause::Watchdog);
         }
@@ -166,7 +170,7 @@ impl Soc {
     pub(crate) fn next_event(&self) -> u64 {
         let timers = self.timers.iter().filter_map(Timer::next_event).min();
         let watchdog = self.iwdg.expires();
-        let times = [watchdog, self.next_can_event()];
+        let times = [watchdog, self.next_can_event(), self.flash.next_event()];
         let other = times.into_iter().flatten().min();
         let other = other.map(|at| self.clock.cycle_at(at));
         timers.into_iter().chain(other).min().unwrap_or(u64::MAX)
@@ -187,6 +191,9 @@ impl Soc {
                     levels |= 1 << irq;
                 }
             }
+        }
+        if self.flash.irq() {
+            levels |= 1 << FLASH_IRQ;
         }
         self.exti.irqs(|irq| levels |= 1 << irq);
         levels
@@ -254,6 +261,7 @@ pub(crate) fn irq_name(irq: u8) -> String {
         }
     }
     match irq {
+        FLASH_IRQ => "FLASH".to_string(),
         6..=10 => format!("EXTI{}", irq - 6),
         23 => "EXTI9_5".to_string(),
         40 => "EXTI15_10".to_string(),

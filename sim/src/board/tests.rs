@@ -1,6 +1,7 @@
 //! The whole board with programs of a few hand-assembled instructions.
 
 mod faults;
+mod flash;
 mod on_the_bus;
 mod rsemu_defects;
 mod running;

@@ -24,7 +24,7 @@ use canmaster::nmt;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-use crate::board::{Board, BoardError, BoardOptions, ResetCause};
+use crate::board::{Board, BoardError, BoardOptions, FlashOptions, ResetCause};
 use crate::bridge::Bridge;
 use crate::bus::{BitTiming, Bus, Event, PortId, WireRecord};
 use crate::drive::{Drive, DriveConfig, DriveStatus, cia402};
@@ -275,6 +275,10 @@ fn board_options(seed: u64) -> BoardOptions {
         clock_error_ppm: random.random_range(-CRYSTAL_PPM..=CRYSTAL_PPM),
         hsi_error_percent: random.random_range(-HSI_PERCENT..=HSI_PERCENT),
         lsi_error_percent: random.random_range(-LSI_PERCENT..=LSI_PERCENT),
+        flash: FlashOptions {
+            seed,
+            ..FlashOptions::default()
+        },
         ..BoardOptions::default()
     }
 }

@@ -165,7 +165,7 @@ impl Soc {
                 }
                 value
             }
-            Block::Flash => self.flash.read(offset),
+            Block::Flash => self.read_flash_register(offset, access),
             Block::Gpio(port) => self.ports[port].read(offset),
             Block::Dbgmcu => match offset / 4 {
                 0 => Some(IDCODE),
@@ -213,16 +213,7 @@ impl Soc {
             }
             Block::Exti => self.exti.write(offset, value),
             Block::Rcc => self.write_rcc(offset, value, access),
-            Block::Flash => match self.flash.write(offset, value) {
-                Ok(known) => {
-                    self.check_clocks(access);
-                    known
-                }
-                Err(words) => {
-                    self.note(access, DiagnosticKind::Flash, format!("FLASH: {words}"));
-                    true
-                }
-            },
+            Block::Flash => self.write_flash_register(offset, value, access),
             Block::Gpio(port) => {
                 let known = self.ports[port].write(offset, value);
                 if matches!(offset, GPIO_MODER | GPIO_AFRL | GPIO_AFRH) {

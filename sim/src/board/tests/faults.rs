@@ -30,12 +30,6 @@ fn a_stack_overflow_reaches_nothing_and_faults() {
 }
 
 #[test]
-fn a_write_to_flash_faults() {
-    let report = fault_of(Program::default().store(0x0804_0000, 1));
-    assert_eq!(report.address, Some(0x0804_0000));
-}
-
-#[test]
 fn a_fault_in_the_fault_handler_locks_the_core_up() {
     let mut board = Program::default().then([UDF]).handler(3, [UDF]).board();
     let first = board.run(Time::from_ms(1));
