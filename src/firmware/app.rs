@@ -262,7 +262,7 @@ mod app {
     /// Empties the receive FIFOs and refills the transmit buffers.
     ///
     /// Trigger: FDCAN1 line 0 (frame received, frame sent, error state), or
-    /// pended by a task that put something into the transmit queue. Budget: 1500
+    /// pended by a task that put something into the transmit queue. Budget: 2000
     /// cycles for three frames each way. If it takes longer than three frames on
     /// the bus (141 us, 24 000 cycles), a FIFO overruns: frames are lost, which
     /// is counted; a lost TPDO is missing in its cycle.
@@ -374,7 +374,7 @@ mod app {
     /// the next SYNC puts into effect.
     ///
     /// Trigger: pended by the last expected TPDO, or TIM3 compare at the
-    /// deadline, whichever is first; once per cycle. Budget: 10 000 cycles. If it
+    /// deadline, whichever is first; once per cycle. Budget: 30 000 cycles. If it
     /// has not run before the next SYNC, that cycle is an overrun: it is counted,
     /// and the drives keep the set-points of the cycle before.
     #[task(
