@@ -9,6 +9,9 @@ pub const DEVICE_TYPE: Address = Address::new(0x1000, 0);
 pub const COB_ID_SYNC: Address = Address::new(0x1005, 0);
 /// Communication cycle period (CiA 301, 7.5.2.6), U32 in microseconds.
 pub const COMMUNICATION_CYCLE: Address = Address::new(0x1006, 0);
+/// Restore default parameters (CiA 301, 7.5.2.14): an index, the sub-index tells
+/// which.
+pub const RESTORE_PARAMETERS: u16 = 0x1011;
 /// Consumer heartbeat time, first entry (CiA 301, 7.5.2.19), U32: node in bits
 /// 23..16, milliseconds in bits 15..0.
 pub const CONSUMER_HEARTBEAT: Address = Address::new(0x1016, 1);
@@ -22,6 +25,10 @@ pub const PRODUCT_CODE: Address = Address::new(0x1018, 2);
 pub const REVISION_NUMBER: Address = Address::new(0x1018, 3);
 /// Identity object: serial number, U32.
 pub const SERIAL_NUMBER: Address = Address::new(0x1018, 4);
+/// Verify configuration: date (CiA 301, 7.5.2.23), U32 in days since 1984-01-01.
+pub const CONFIGURATION_DATE: Address = Address::new(0x1020, 1);
+/// Verify configuration: time, U32 in milliseconds since midnight.
+pub const CONFIGURATION_TIME: Address = Address::new(0x1020, 2);
 
 /// Sub-index of a PDO communication parameter: COB-ID.
 pub const PDO_COB_ID: u8 = 1;

@@ -3,6 +3,8 @@
 use super::failure::Failure;
 use crate::frame::Frame;
 use crate::id::NodeId;
+use crate::lss::{LssAddress, LssError};
+use crate::words::in_words;
 
 /// What the caller has to do next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -11,6 +13,8 @@ pub enum Action {
     Send(Frame),
     /// Begin to produce SYNC: 1005h, bit 30.
     ProduceSync,
+    /// The pause after bus-off is over: let the controller take part again.
+    RestartController,
     /// Something worth telling.
     Report(Event),
 }
@@ -19,8 +23,8 @@ pub enum Action {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Event {
-    /// NMT reset communication went to all nodes; the boot-up frames are
-    /// awaited.
+    /// NMT reset communication went to all nodes that are not to be kept alive;
+    /// the boot-up frames are awaited.
     ResetSent,
     /// The node sent its boot-up frame.
     BootUp(NodeId),
@@ -35,47 +39,121 @@ pub enum Event {
         /// Writes in all.
         total: u16,
     },
-    /// Its configuration is complete.
+    /// Its configuration is complete, or was found to be (1020h).
     Configured(NodeId),
     /// Its heartbeat is seen: it is ready to be started.
     Ready(NodeId),
+    /// It was operational already and is left running: boot status L.
+    LeftRunning(NodeId),
+    /// It is not in the list of this master (1F81h, bit 0): boot status A.
+    NotListed(NodeId),
     /// It was given up.
     Failed(NodeId, Failure),
+    /// All mandatory nodes are booted; the start is the application's to order
+    /// (1F80h, bit 2).
+    StartAwaited,
     /// NMT start went to the nodes.
     StartSent,
+    /// The master is operational and leaves the start of the nodes to the
+    /// application (1F80h, bit 3).
+    StartLeft,
     /// The node reports operational.
     Operational(NodeId),
+    /// A node that was booted booted again, fell silent or left operational. It
+    /// is taken through boot-up again.
+    NodeLost(NodeId),
+    /// A node that was lost is operational again.
+    NodeBack(NodeId),
     /// Every mandatory node is checked, configured and operational.
     NetworkReady,
+    /// That is no longer so.
+    NetworkDown,
     /// A mandatory node failed: nothing is started.
     NetworkFailed,
+    /// An error of a mandatory node stopped all nodes (1F80h, bit 6).
+    NetworkStopped,
+    /// The controller is bus-off.
+    BusOff {
+        /// Until it is restarted.
+        pause_ms: u32,
+    },
+    /// The controller is restarted; the silent phase begins.
+    BusRestarted,
+    /// Nodes without node-ID are looked for (CiA 305, fastscan).
+    Scanning,
+    /// The node with the serial number that the network names was given its
+    /// node-ID.
+    IdGiven {
+        /// The node-ID.
+        node: NodeId,
+        /// Whether the node keeps it when its supply is off.
+        stored: bool,
+    },
+    /// The node was found, but took no node-ID.
+    IdFailed(NodeId, LssError),
+    /// A node without node-ID that the network does not name.
+    Stranger(LssAddress),
 }
 
-#[cfg(feature = "defmt")]
-impl defmt::Format for Event {
-    fn format(&self, f: defmt::Formatter<'_>) {
-        match self {
-            Event::ResetSent => defmt::write!(f, "reset communication sent, awaiting the nodes"),
-            Event::BootUp(node) => defmt::write!(f, "node {}: boot-up", node),
-            Event::Identified(node) => defmt::write!(f, "node {}: is the expected device", node),
-            Event::Configuring { node, done, total } => {
-                defmt::write!(
-                    f,
-                    "node {}: configuring, {} of {} writes",
-                    node,
-                    done,
-                    total
-                )
-            }
-            Event::Configured(node) => defmt::write!(f, "node {}: configured", node),
-            Event::Ready(node) => defmt::write!(f, "node {}: heartbeat seen, ready to start", node),
-            Event::Failed(node, failure) => defmt::write!(f, "node {}: {}", node, failure),
-            Event::StartSent => defmt::write!(f, "NMT start sent"),
-            Event::Operational(node) => defmt::write!(f, "node {}: operational", node),
-            Event::NetworkReady => defmt::write!(f, "network ready: every node is operational"),
-            Event::NetworkFailed => {
-                defmt::write!(f, "network not started: a mandatory node failed")
-            }
+impl Event {
+    /// The node that it is about, if it is about one.
+    pub const fn node(&self) -> Option<NodeId> {
+        match *self {
+            Event::BootUp(node)
+            | Event::Identified(node)
+            | Event::Configuring { node, .. }
+            | Event::Configured(node)
+            | Event::Ready(node)
+            | Event::LeftRunning(node)
+            | Event::NotListed(node)
+            | Event::Failed(node, _)
+            | Event::Operational(node)
+            | Event::NodeLost(node)
+            | Event::NodeBack(node)
+            | Event::IdGiven { node, .. }
+            | Event::IdFailed(node, _) => Some(node),
+            _ => None,
         }
     }
 }
+
+in_words!(Event {
+    Event::ResetSent => ("reset communication sent, awaiting the nodes"),
+    Event::BootUp(node) => ("node {}: boot-up", node),
+    Event::Identified(node) => ("node {}: is the expected device", node),
+    Event::Configuring { node, done, total } => (
+        "node {}: configuring, {} of {} writes", node, done, total
+    ),
+    Event::Configured(node) => ("node {}: configured", node),
+    Event::Ready(node) => ("node {}: ready to start", node),
+    Event::LeftRunning(node) => (
+        "node {}: was operational already and is left running (boot status L)", node
+    ),
+    Event::NotListed(node) => (
+        "node {}: not in the list of this master (1F81h), left alone (boot status A)", node
+    ),
+    Event::Failed(node, failure) => ("node {}: {}", node, failure),
+    Event::StartAwaited => (
+        "every mandatory node is booted; the start has to be requested (1F82h)"
+    ),
+    Event::StartSent => ("NMT start sent"),
+    Event::StartLeft => ("the nodes are to be started by request (1F82h)"),
+    Event::Operational(node) => ("node {}: operational", node),
+    Event::NodeLost(node) => ("node {}: lost, to be booted again", node),
+    Event::NodeBack(node) => ("node {}: is back", node),
+    Event::NetworkReady => ("network ready: every node is operational"),
+    Event::NetworkDown => ("network not ready: a mandatory node is not operational"),
+    Event::NetworkFailed => ("network not started: a mandatory node failed"),
+    Event::NetworkStopped => ("all nodes stopped after the error of a mandatory node"),
+    Event::BusOff { pause_ms } => ("bus-off: restarting the controller in {} ms", pause_ms),
+    Event::BusRestarted => ("controller restarted, silent until the drives are at rest"),
+    Event::Scanning => ("looking for nodes without node-ID"),
+    Event::IdGiven { node, stored: true } => ("node {}: found by its serial number, node-ID given", node),
+    Event::IdGiven { node, stored: false } => (
+        "node {}: found by its serial number, node-ID given, but the node does not store it", node
+    ),
+    Event::IdFailed(node, error) => ("node {}: took no node-ID: {}", node, error),
+    Event::Stranger(address) => (
+        "a node without node-ID is not in the network description: {}", address
+    ),
+});

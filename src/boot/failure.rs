@@ -2,44 +2,47 @@
 
 use crate::id::Address;
 use crate::sdo::AbortCode;
-use core::fmt;
+use crate::words::in_words;
 
 /// Error status of the boot-up of a node (CiA 302-2, table "Error status of
-/// the boot slave process").
+/// the boot slave process"). G, H and I belong to the check and the update of
+/// the node's program, which this master does not offer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
+#[repr(u8)]
 pub enum Status {
+    /// The node is not in the list of this master (1F81h, bit 0).
+    A = b'A',
     /// No answer when the device type (1000h) was asked for.
-    B,
+    B = b'B',
     /// The device type is not the expected one (1F84h).
-    C,
+    C = b'C',
     /// The vendor-ID is not the expected one (1F85h).
-    D,
+    D = b'D',
+    /// No heartbeat told the state of a node that is to be kept alive.
+    E = b'E',
+    /// No answer to node guarding told the state of a node that is to be kept
+    /// alive.
+    F = b'F',
     /// The configuration could not be written.
-    J,
-    /// No heartbeat came after the configuration.
-    K,
+    J = b'J',
+    /// No heartbeat, or no answer to node guarding, came after the
+    /// configuration.
+    K = b'K',
+    /// The node was operational already and is left running: a success.
+    L = b'L',
     /// The product code is not the expected one (1F86h).
-    M,
+    M = b'M',
     /// The revision number is not the expected one (1F87h).
-    N,
+    N = b'N',
     /// The serial number is not the expected one (1F88h).
-    O,
+    O = b'O',
 }
 
 impl Status {
     /// The letter that the standard gives it.
     pub const fn letter(self) -> char {
-        match self {
-            Status::B => 'B',
-            Status::C => 'C',
-            Status::D => 'D',
-            Status::J => 'J',
-            Status::K => 'K',
-            Status::M => 'M',
-            Status::N => 'N',
-            Status::O => 'O',
-        }
+        self as u8 as char
     }
 }
 
@@ -47,9 +50,11 @@ impl Status {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Cause {
+    /// The network description or 1F81h leaves it out.
+    NotListed,
     /// No boot-up frame within the boot time (1F89h).
     NoBootUp,
-    /// It restarted again and again while it was being configured.
+    /// It restarted again and again while it was being booted.
     Restarts,
     /// Its SDO server did not answer, however often it was asked.
     NoAnswer {
@@ -77,7 +82,9 @@ pub enum Cause {
         /// What the node says.
         found: u32,
     },
-    /// No heartbeat within three of its periods.
+    /// It did not tell its NMT state, so that nobody knows whether it runs.
+    NoState,
+    /// No heartbeat within three of its periods, or no answer to node guarding.
     NoHeartbeat,
     /// It did not report operational after NMT start.
     NotOperational,
@@ -87,6 +94,7 @@ impl Cause {
     /// What to do about it.
     pub const fn advice(&self) -> &'static str {
         match self {
+            Cause::NotListed => "set bit 0 of 1F81h for it",
             Cause::NoBootUp => {
                 "check its power supply, the bus wiring and termination, its node-ID and its bit rate"
             }
@@ -100,6 +108,7 @@ impl Cause {
             Cause::Mismatch { .. } => {
                 "connect the drive that the network names, or name this one in the network"
             }
+            Cause::NoState => "check the heartbeat time or the guard time that it was given",
             Cause::NoHeartbeat | Cause::NotOperational => {
                 "check the drive's error memory (1003h) and the wiring"
             }
@@ -107,50 +116,20 @@ impl Cause {
     }
 }
 
-impl fmt::Display for Cause {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match *self {
-            Cause::NoBootUp => f.write_str("no boot-up frame"),
-            Cause::Restarts => f.write_str("restarts again and again"),
-            Cause::NoAnswer { at } => write!(f, "no answer to the access to {at}"),
-            Cause::Refused { at, code } => write!(f, "access to {at} refused: {code}"),
-            Cause::Garbled { at } => write!(f, "wrong answer to the access to {at}"),
-            Cause::Mismatch {
-                at,
-                expected,
-                found,
-            } => {
-                write!(f, "{at} is {found:08X}h, expected {expected:08X}h")
-            }
-            Cause::NoHeartbeat => f.write_str("no heartbeat after the configuration"),
-            Cause::NotOperational => f.write_str("not operational after NMT start"),
-        }
-    }
-}
-
-#[cfg(feature = "defmt")]
-impl defmt::Format for Cause {
-    fn format(&self, f: defmt::Formatter<'_>) {
-        match *self {
-            Cause::NoBootUp => defmt::write!(f, "no boot-up frame"),
-            Cause::Restarts => defmt::write!(f, "restarts again and again"),
-            Cause::NoAnswer { at } => defmt::write!(f, "no answer to the access to {}", at),
-            Cause::Refused { at, code } => {
-                defmt::write!(f, "access to {} refused: {}", at, code)
-            }
-            Cause::Garbled { at } => defmt::write!(f, "wrong answer to the access to {}", at),
-            Cause::Mismatch {
-                at,
-                expected,
-                found,
-            } => {
-                defmt::write!(f, "{} is {:08X}h, expected {:08X}h", at, found, expected)
-            }
-            Cause::NoHeartbeat => defmt::write!(f, "no heartbeat after the configuration"),
-            Cause::NotOperational => defmt::write!(f, "not operational after NMT start"),
-        }
-    }
-}
+in_words!(Cause {
+    Cause::NotListed => ("not in the list of this master (1F81h)"),
+    Cause::NoBootUp => ("no boot-up frame"),
+    Cause::Restarts => ("restarts again and again"),
+    Cause::NoAnswer { at } => ("no answer to the access to {}", at),
+    Cause::Refused { at, code } => ("access to {} refused: {}", at, code),
+    Cause::Garbled { at } => ("wrong answer to the access to {}", at),
+    Cause::Mismatch { at, expected, found } => (
+        "{} is {:08X}h, expected {:08X}h", at, found, expected
+    ),
+    Cause::NoState => ("does not tell its NMT state"),
+    Cause::NoHeartbeat => ("no heartbeat after the configuration"),
+    Cause::NotOperational => ("not operational after NMT start"),
+});
 
 /// A node that was not booted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -161,28 +140,40 @@ pub struct Failure {
     pub cause: Cause,
 }
 
-impl fmt::Display for Failure {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Failure { status, cause } = self;
-        write!(
-            f,
-            "{cause} (boot status {}); {}",
-            status.letter(),
-            cause.advice()
-        )
+in_words!(Failure {
+    Failure { status, cause } => (
+        "{} (boot status {}); {}", cause, status.letter(), cause.advice()
+    ),
+});
+
+/// How far the boot-up of a node came.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum BootResult {
+    /// Not begun, or not at its end.
+    Pending,
+    /// Booted: no letter.
+    Booted,
+    /// Found operational and left so: L.
+    LeftRunning,
+    /// Not booted.
+    Failed(Failure),
+}
+
+impl BootResult {
+    /// The error status, where there is one.
+    pub const fn status(&self) -> Option<Status> {
+        match self {
+            BootResult::Pending | BootResult::Booted => None,
+            BootResult::LeftRunning => Some(Status::L),
+            BootResult::Failed(failure) => Some(failure.status),
+        }
     }
 }
 
-#[cfg(feature = "defmt")]
-impl defmt::Format for Failure {
-    fn format(&self, f: defmt::Formatter<'_>) {
-        let Failure { status, cause } = self;
-        defmt::write!(
-            f,
-            "{} (boot status {}); {}",
-            cause,
-            status.letter(),
-            cause.advice()
-        );
-    }
-}
+in_words!(BootResult {
+    BootResult::Pending => ("not booted yet"),
+    BootResult::Booted => ("booted"),
+    BootResult::LeftRunning => ("was operational already and is left running (boot status L)"),
+    BootResult::Failed(failure) => ("{}", failure),
+});

@@ -1,71 +1,112 @@
-//! Start of the network: CiA 302-2, "NMT start-up".
+//! The boot-up of a network, as its caller sees it.
 
+use super::bus_off::Pauses;
 use super::event::{Action, Event};
+use super::factory::Factory;
+use super::failure::BootResult;
 use super::node::NodeBoot;
+use super::phase::Phase;
+use super::settings::{Settings, Startup};
 use crate::frame::Frame;
-use crate::id::FunctionCode;
+use crate::id::{CobId, FunctionCode, NodeId};
 use crate::network::Network;
-use crate::nmt::{Command, ErrorControl, NodeControl};
+use crate::nmt::ErrorControl;
 use crate::time::{Duration, Instant};
 use heapless::{Deque, Vec};
 
 /// Actions of the network itself that one stimulus can cause at most.
 const OUTBOX: usize = 4;
-/// Heartbeats of a node that may pass until one says operational.
-const HEARTBEATS_AWAITED: u32 = 3;
-/// The time that a node without heartbeat is given to become operational.
-const UNWATCHED_START: Duration = Duration::from_millis(100);
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Phase {
-    /// Nothing is sent, so that drives left running miss the master's
-    /// heartbeat and come to rest.
-    Silent {
-        until: Instant,
-    },
-    /// NMT reset communication is sent; the nodes boot, each at its own pace.
-    Booting,
-    /// SYNC runs; after a few of them the nodes are started.
-    Synchronising {
-        until: Instant,
-    },
-    /// NMT start is sent; every node has to report operational.
-    Starting {
-        deadline: Instant,
-    },
-    Running,
-    Failed,
-}
 
 /// Boot-up of a network of at most `N` nodes.
+///
+/// NMT start is never sent while a mandatory node is not booted. A node that
+/// is lost later is taken through boot-up again while the others run on.
 #[derive(Debug)]
 pub struct NetworkBoot<const N: usize> {
-    network: &'static Network,
-    nodes: Vec<NodeBoot, N>,
-    phase: Phase,
+    pub(super) network: &'static Network,
+    pub(super) startup: Startup,
+    /// 1F89h; zero: for ever.
+    pub(super) boot_time: Duration,
+    pub(super) nodes: Vec<NodeBoot, N>,
+    pub(super) phase: Phase,
+    /// Every mandatory node is operational, and that has been told.
+    pub(super) ready: bool,
+    /// The start came to its end once: a mandatory node that fails is waited for.
+    pub(super) ran: bool,
+    /// The application ordered the start that 1F80h, bit 2, leaves to it.
+    pub(super) ordered: bool,
+    /// Nodes without node-ID are looked for before the nodes are reset.
+    pub(super) scan_first: bool,
+    /// They were looked for.
+    pub(super) scanned: bool,
+    pub(super) factory: Factory,
+    /// Where bus-off leads back to, if the network was halted before.
+    pub(super) halted: Option<Phase>,
+    pauses: Pauses,
     /// Where the last round over the nodes stopped, so that none starves.
     next: usize,
     outbox: Deque<Action, OUTBOX>,
 }
 
 impl<const N: usize> NetworkBoot<N> {
-    /// Begins with the silent phase at `now`. Nodes beyond the first `N` are
-    /// left out; [`len`](Self::len) tells how many there are.
+    /// Begins with the silent phase at `now`, with the settings of the network's
+    /// design. Nodes beyond the first `N` are left out; [`len`](Self::len)
+    /// tells how many there are.
     pub fn new(network: &'static Network, now: Instant) -> NetworkBoot<N> {
+        NetworkBoot::with_settings(network, &Settings::of(network), now)
+    }
+
+    /// The same with other settings. If this device is not the NMT master (1F80h,
+    /// bit 0), nothing is ever done.
+    pub fn with_settings(
+        network: &'static Network,
+        settings: &Settings<N>,
+        now: Instant,
+    ) -> NetworkBoot<N> {
+        let until = now + network.master.silence;
         NetworkBoot {
             network,
+            startup: settings.startup,
+            boot_time: settings.boot_time,
             nodes: network
                 .nodes
                 .iter()
-                .take(N)
-                .map(|node| NodeBoot::new(network, node))
+                .zip(&settings.nodes)
+                .map(|(node, settings)| NodeBoot::new(network, node, *settings))
                 .collect(),
-            phase: Phase::Silent {
-                until: now + network.master.silence,
+            phase: if settings.startup.has(Startup::MASTER) {
+                Phase::Silent { until }
+            } else {
+                Phase::NotMaster
             },
+            ready: false,
+            ran: false,
+            ordered: false,
+            scan_first: false,
+            scanned: false,
+            factory: Factory::new(),
+            halted: None,
+            pauses: Pauses::new(),
             next: 0,
             outbox: Deque::new(),
         }
+    }
+
+    /// Takes over changed settings. What was done to a node already is done again
+    /// only at its next boot-up.
+    pub fn set_settings(&mut self, settings: &Settings<N>) {
+        self.startup = settings.startup;
+        self.boot_time = settings.boot_time;
+        for (node, settings) in self.nodes.iter_mut().zip(&settings.nodes) {
+            node.set_settings(*settings);
+        }
+    }
+
+    /// Before the nodes are reset for the first time, those that the network
+    /// names by serial number and that have no node-ID are given theirs. Without
+    /// this it is done only when such a node is missing.
+    pub fn give_ids_first(&mut self) {
+        self.scan_first = true;
     }
 
     /// How many nodes are booted.
@@ -78,42 +119,90 @@ impl<const N: usize> NetworkBoot<N> {
         self.nodes.is_empty()
     }
 
-    /// Whether the silent phase after a reset is still on: the master's
-    /// heartbeat waits for its end.
+    /// Whether the master is to be silent, as after a reset and after bus-off:
+    /// its heartbeat waits for the end.
     pub fn is_silent(&self) -> bool {
-        matches!(self.phase, Phase::Silent { .. })
+        matches!(self.phase, Phase::Silent { .. } | Phase::BusOff { .. })
     }
 
     /// Whether every mandatory node is checked, configured and operational.
     pub fn is_ready(&self) -> bool {
-        self.phase == Phase::Running
+        self.ready
     }
 
-    /// Whether a mandatory node failed. Nothing leads out but a new start.
+    /// Whether a mandatory node failed in the start. Nothing leads out but a new
+    /// start, or a [`request`](Self::request) to reset all nodes.
     pub fn is_failed(&self) -> bool {
         self.phase == Phase::Failed
     }
 
-    /// Takes in a frame from an SDO server or from error control; all others
-    /// are left alone.
+    /// How far the boot-up of a node came; `None` for a node that the network
+    /// does not name.
+    pub fn result(&self, node: NodeId) -> Option<BootResult> {
+        self.nodes
+            .iter()
+            .find(|boot| boot.node().id == node)
+            .map(NodeBoot::result)
+    }
+
+    /// Takes in a frame from an SDO server, from error control or from an LSS
+    /// slave; all others are left alone.
     pub fn on_frame(&mut self, frame: &Frame, now: Instant) {
+        if !self.phase.listens() {
+            return;
+        }
+        if frame.id() == CobId::LSS_SLAVE {
+            if self.phase == Phase::Scanning
+                && let Some(action) = self.factory.on_frame(frame, self.network.nodes)
+            {
+                self.push(action);
+            }
+            return;
+        }
         let Some((function, id)) = frame.id().split() else {
             return;
         };
-        let booting = !self.is_ready() && !self.is_failed();
         let Some(node) = self.nodes.iter_mut().find(|boot| boot.node().id == id) else {
             return;
         };
         match function {
             FunctionCode::SdoResponse => node.on_sdo(frame, now),
-            // Once the network runs, or has failed, it is left to supervision.
-            FunctionCode::ErrorControl if booting => {
+            FunctionCode::ErrorControl => {
                 if let Some(heard) = ErrorControl::decode(frame) {
-                    node.on_error_control(heard.state);
+                    node.on_error_control(heard.state, now);
                 }
             }
             _ => {}
         }
+    }
+
+    /// The heartbeat of a node stayed away, or it does not answer to node
+    /// guarding: whoever consumes it tells so.
+    pub fn node_lost(&mut self, id: NodeId) {
+        if let Some(node) = self.nodes.iter_mut().find(|boot| boot.node().id == id) {
+            node.lose(false);
+        }
+    }
+
+    /// The controller is bus-off. After a pause [`Action::RestartController`]
+    /// comes, then the silent phase, and the nodes are booted again.
+    pub fn bus_off(&mut self, now: Instant) {
+        if self.phase == Phase::NotMaster {
+            return;
+        }
+        let pause = self.pauses.next(now);
+        self.halted = match self.phase {
+            Phase::Failed | Phase::Stopped => Some(self.phase),
+            Phase::BusOff { .. } => self.halted,
+            _ => None,
+        };
+        for node in &mut self.nodes {
+            node.halt();
+        }
+        self.phase = Phase::BusOff { until: now + pause };
+        let pause_ms = pause.as_millis();
+        self.report(Event::BusOff { pause_ms });
+        self.tell_ready();
     }
 
     /// The next thing to do, if there is one now: to be called until it
@@ -130,16 +219,19 @@ impl<const N: usize> NetworkBoot<N> {
             }
             self.next = index + 1;
         }
+        self.next = 0;
         self.advance(now);
-        self.outbox.pop_front()
+        // What the network did may let a node go on.
+        self.outbox
+            .pop_front()
+            .or_else(|| self.nodes.iter_mut().find_map(|node| node.poll(now)))
     }
 
     /// When [`poll`](Self::poll) has to be called again at the latest.
     pub fn next_deadline(&self) -> Option<Instant> {
         let own = match self.phase {
-            Phase::Silent { until } | Phase::Synchronising { until } => Some(until),
-            Phase::Starting { deadline } => Some(deadline),
-            Phase::Booting | Phase::Running | Phase::Failed => None,
+            Phase::Scanning => self.factory.next_deadline(),
+            phase => phase.deadline(),
         };
         self.nodes
             .iter()
@@ -148,104 +240,13 @@ impl<const N: usize> NetworkBoot<N> {
             .min()
     }
 
-    fn advance(&mut self, now: Instant) {
-        match self.phase {
-            Phase::Silent { until } if now >= until => self.reset(now),
-            Phase::Booting => self.finish_booting(now),
-            Phase::Synchronising { until } if now >= until => self.start(now),
-            Phase::Starting { deadline } => self.finish_starting(deadline, now),
-            _ => {}
-        }
+    pub(super) fn report(&mut self, event: Event) {
+        self.push(Action::Report(event));
     }
 
-    fn reset(&mut self, now: Instant) {
-        self.push(Action::Send(
-            NodeControl::all(Command::ResetCommunication).frame(),
-        ));
-        self.push(Action::Report(Event::ResetSent));
-        for node in &mut self.nodes {
-            node.start(now);
-        }
-        self.phase = Phase::Booting;
-    }
-
-    /// All nodes are waited for even when one has failed, so that one run
-    /// names everything that is wrong.
-    fn finish_booting(&mut self, now: Instant) {
-        if !self
-            .nodes
-            .iter()
-            .all(|boot| boot.is_ready() || boot.is_failed())
-        {
-            return;
-        }
-        if self.mandatory_failed() {
-            return self.fail();
-        }
-        self.push(Action::ProduceSync);
-        let syncs = u32::from(self.network.master.syncs_before_start);
-        let span = self.network.cycle.as_micros().saturating_mul(syncs);
-        self.phase = Phase::Synchronising {
-            until: now + Duration::from_micros(span),
-        };
-    }
-
-    /// By broadcast where all are to start, else one by one: a node that
-    /// failed must stay where it is (1F80h, bit 1).
-    fn start(&mut self, now: Instant) {
-        if self.nodes.iter().all(NodeBoot::is_ready) {
-            self.push(Action::Send(NodeControl::all(Command::Start).frame()));
-        } else {
-            for boot in &mut self.nodes {
-                if boot.is_ready() {
-                    boot.send(Command::Start);
-                }
-            }
-        }
-        self.push(Action::Report(Event::StartSent));
-        let slowest = self
-            .nodes
-            .iter()
-            .map(|boot| {
-                Duration::from_millis(u32::from(boot.node().heartbeat_ms) * HEARTBEATS_AWAITED)
-            })
-            .max();
-        let patience = slowest.unwrap_or_default().max(UNWATCHED_START);
-        self.phase = Phase::Starting {
-            deadline: now + patience,
-        };
-    }
-
-    fn finish_starting(&mut self, deadline: Instant, now: Instant) {
-        let waiting = |boot: &NodeBoot| {
-            !boot.is_failed()
-                && !(boot.is_ready() && (boot.is_operational() || boot.node().heartbeat_ms == 0))
-        };
-        if !self.nodes.iter().any(waiting) {
-            self.push(Action::Report(Event::NetworkReady));
-            self.phase = Phase::Running;
-        } else if now >= deadline {
-            for boot in self.nodes.iter_mut().filter(|boot| waiting(boot)) {
-                boot.fail_to_start();
-            }
-            if self.mandatory_failed() {
-                self.fail();
-            }
-        }
-    }
-
-    fn mandatory_failed(&self) -> bool {
-        self.nodes
-            .iter()
-            .any(|boot| boot.is_failed() && boot.node().mandatory)
-    }
-
-    fn fail(&mut self) {
-        self.push(Action::Report(Event::NetworkFailed));
-        self.phase = Phase::Failed;
-    }
-
-    fn push(&mut self, action: Action) {
+    /// Not inlined: it is called from everywhere.
+    #[inline(never)]
+    pub(super) fn push(&mut self, action: Action) {
         // The outbox holds what one stimulus can cause; it is emptied before
         // the next one.
         let _ = self.outbox.push_back(action);

@@ -272,23 +272,16 @@ impl<B: Board, const N: usize> ObjectDictionary for View<'_, B, N> {
 impl<const N: usize> Dictionary<N> {
     /// Takes note of a step of the boot-up.
     pub(super) fn on_boot_event(&mut self, event: &crate::boot::Event) {
-        use crate::boot::Event as Step;
         let Some(status) = NodeStatus::after(event) else {
             return;
         };
-        match *event {
-            Step::BootUp(node)
-            | Step::Identified(node)
-            | Step::Configuring { node, .. }
-            | Step::Configured(node)
-            | Step::Ready(node)
-            | Step::Operational(node)
-            | Step::Failed(node, _) => {
+        match event.node() {
+            Some(node) => {
                 if let Some(record) = self.record(node) {
                     record.status = status;
                 }
             }
-            _ => {
+            None => {
                 let known = usize::from(nodes::<N>(self.network));
                 for record in self.nodes.iter_mut().take(known) {
                     record.status = status;

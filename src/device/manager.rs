@@ -4,7 +4,7 @@
 use super::found::{Found, Item, Lookup, per_node, variable};
 use super::index;
 use super::node_record::HISTORY;
-use super::settings::{Setting, nodes};
+use super::settings::{RESTORE_ALL, Setting, nodes};
 use crate::id::NodeId;
 use crate::network::{Identity, Network};
 use crate::od::{Access, DataType};
@@ -12,9 +12,6 @@ use crate::sdo::AbortCode;
 
 /// The sub-index that means all nodes.
 const ALL: u8 = 0x80;
-/// What a node is told to restore before it is configured: 1011h:01, all
-/// parameters.
-const RESTORE_ALL: u32 = 1;
 
 pub(super) fn find<const N: usize>(network: &'static Network, at: u16, sub: u8) -> Lookup {
     use DataType::{Unsigned8, Unsigned32, VisibleString};
@@ -56,7 +53,7 @@ pub(super) fn find<const N: usize>(network: &'static Network, at: u16, sub: u8) 
         index::EXPECTED_SERIAL => expected(|identity| identity.serial),
         index::BOOT_TIME => variable(sub, Found::setting(Setting::BootTime)),
         index::RESTORE_CONFIGURATION => per_node(sub, |node| {
-            let restore = network.find(node).map_or(0, |_| RESTORE_ALL);
+            let restore = network.find(node).map_or(0, |_| u32::from(RESTORE_ALL));
             Found::number(Unsigned8, restore)
         }),
         index::BOOT_LETTER => per_node(sub, |node| {

@@ -41,7 +41,7 @@ mod window;
 
 pub use error::MasterError;
 pub use node_record::NodeStatus;
-pub use settings::{Assignment, Setting, Settings, Startup};
+pub use settings::{Setting, Settings};
 
 use crate::boot;
 use crate::emcy::{self, Emcy};

@@ -1,6 +1,6 @@
 //! What the master knows of a node: boot-up, NMT state, emergencies.
 
-use crate::boot::{Cause, Event, Failure};
+use crate::boot::{Cause, Event, Failure, Status};
 use crate::emcy::{Emcy, History};
 use crate::nmt::State;
 use core::fmt;
@@ -32,6 +32,10 @@ pub enum NodeStatus {
     Ready,
     /// It was started.
     Operational,
+    /// It was operational already and is left so: L.
+    LeftRunning,
+    /// It was booted and is not what it should be: it is booted again.
+    Lost,
     /// It was given up.
     Failed(Failure),
 }
@@ -46,7 +50,13 @@ impl NodeStatus {
             Event::Configuring { done, total, .. } => NodeStatus::Configuring { done, total },
             Event::Configured(_) => NodeStatus::Configured,
             Event::Ready(_) => NodeStatus::Ready,
-            Event::Operational(_) => NodeStatus::Operational,
+            Event::Operational(_) | Event::NodeBack(_) => NodeStatus::Operational,
+            Event::LeftRunning(_) => NodeStatus::LeftRunning,
+            Event::NodeLost(_) => NodeStatus::Lost,
+            Event::NotListed(_) => NodeStatus::Failed(Failure {
+                status: Status::A,
+                cause: Cause::NotListed,
+            }),
             Event::Failed(_, failure) => NodeStatus::Failed(failure),
             _ => return None,
         })
@@ -56,6 +66,7 @@ impl NodeStatus {
     pub const fn letter(&self) -> u8 {
         match self {
             NodeStatus::Failed(failure) => failure.status.letter() as u8,
+            NodeStatus::LeftRunning => Status::L.letter() as u8,
             _ => 0,
         }
     }
@@ -74,6 +85,8 @@ impl fmt::Display for NodeStatus {
             NodeStatus::Configured => f.write_str("configured, heartbeat awaited"),
             NodeStatus::Ready => f.write_str("ready to be started"),
             NodeStatus::Operational => f.write_str("operational"),
+            NodeStatus::LeftRunning => f.write_str("was operational already and is left running"),
+            NodeStatus::Lost => f.write_str("lost, to be booted again"),
             NodeStatus::Failed(Failure { status, cause }) => {
                 write!(f, "{} (boot status {})", words(cause), status.letter())
             }
@@ -85,12 +98,14 @@ impl fmt::Display for NodeStatus {
 /// the device.
 const fn words(cause: &Cause) -> &'static str {
     match cause {
+        Cause::NotListed => "not in the list of this master",
         Cause::NoBootUp => "no boot-up frame",
         Cause::Restarts => "restarts again and again",
         Cause::NoAnswer { .. } => "no answer to an access",
         Cause::Refused { .. } => "an access was refused",
         Cause::Garbled { .. } => "wrong answer to an access",
         Cause::Mismatch { .. } => "not the expected device",
+        Cause::NoState => "does not tell its NMT state",
         Cause::NoHeartbeat => "no heartbeat after the configuration",
         Cause::NotOperational => "not operational after NMT start",
     }

@@ -116,6 +116,9 @@ pub(crate) fn act(action: &Action, log: &mut Log, shared: &mut Shared<'_>) {
     match action {
         Action::Send(frame) => send(*frame, shared),
         Action::ProduceSync => shared.od.lock(|od| od.set_sync_producer(true)),
+        // Only asked for after `NetworkBoot::bus_off`, which nobody calls: the
+        // controller stays bus-off until the board is reset.
+        Action::RestartController => {}
         Action::Report(event) => {
             if *event == boot::Event::StartSent {
                 shared.od.lock(|od| od.expect(TpdoSlots::all_of(AXES)));

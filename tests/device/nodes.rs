@@ -27,6 +27,8 @@ fn the_boot_up_in_words() {
         (Event::Ready(node(2)), "ready to be started"),
         (Event::StartSent, "ready to be started"),
         (Event::Operational(node(2)), "operational"),
+        (Event::NodeLost(node(2)), "lost, to be booted again"),
+        (Event::NodeBack(node(2)), "operational"),
     ];
     for (step, words) in steps {
         b.boot(step);
@@ -36,6 +38,16 @@ fn the_boot_up_in_words() {
     assert_eq!(b.text(0x2F01, 1), "axis 1: boot-up frame awaited");
     assert_eq!(b.text(0x2F01, 7), "not in the network");
     assert_eq!(b.number(0x2F00, 7), Ok(0));
+}
+
+#[test]
+fn letters_that_are_no_failures() {
+    let mut b = Bench::new();
+    b.boot(Event::LeftRunning(node(3)));
+    assert_eq!(b.number(0x2F00, 3), Ok(u64::from(b'L')));
+    b.boot(Event::NotListed(node(4)));
+    assert_eq!(b.number(0x2F00, 4), Ok(u64::from(b'A')));
+    assert_eq!(b.number(0x2F00, 2), Ok(0));
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! Settings: which values are taken, and that they survive.
 
 use crate::rig::{Bench, ms, node};
-use canmaster::device::{Assignment, Event, Setting, Startup};
+use canmaster::boot::{Assignment, Startup};
+use canmaster::device::{Event, Setting};
 use canmaster::network::sample::SIX_EPOS4;
 use canmaster::nmt::{Command, ErrorBehaviour, NodeControl, State, Target};
 use canmaster::sdo::AbortCode;

@@ -1,12 +1,11 @@
 //! What a client may change and 1010h saves.
 
-mod manager;
 mod setting;
 mod stored;
 
-pub use manager::{Assignment, Startup};
 pub use setting::Setting;
 
+use crate::boot::{self, Assignment, Startup};
 use crate::emcy::EmcyCobId;
 use crate::id::NodeId;
 use crate::network::Network;
@@ -33,6 +32,9 @@ pub struct Settings<const N: usize> {
     configured: [u32; 2],
 }
 
+/// 1F8Ah: what a node is told to restore before it is configured: 1011h:01, all
+/// parameters.
+pub(super) const RESTORE_ALL: u8 = 1;
 /// How often TIME is sent unless told otherwise.
 const TIME_PERIOD_MS: u16 = 1000;
 /// A consumer heartbeat time: node in bits 23..16, milliseconds in bits 15..0.
@@ -151,6 +153,20 @@ impl<const N: usize> Settings<N> {
         Duration::from_millis(self.boot_time_ms)
     }
 
+    /// What the boot-up of the network goes by: 1F80h, 1F81h, 1F89h; 1F26h, 1F27h
+    /// and 1F8Ah as they are in this dictionary.
+    pub fn boot(&self) -> boot::Settings<N> {
+        boot::Settings {
+            startup: self.startup,
+            boot_time: self.boot_time(),
+            nodes: self.assignments.map(|assignment| boot::NodeSettings {
+                assignment,
+                restore: RESTORE_ALL,
+                configured: [0; 2],
+            }),
+        }
+    }
+
     /// The value of an entry.
     pub fn get(&self, setting: Setting) -> u32 {
         match setting {
@@ -228,12 +244,11 @@ impl<const N: usize> Settings<N> {
                     ErrorBehaviour::from_code(code).ok_or(AbortCode::VALUE_RANGE)?;
             }
             Setting::Startup => {
-                offered(value, Startup::OFFERED)?;
-                self.startup = Startup(value);
+                self.startup = Startup::new(value)?;
             }
             Setting::Assignment(n) => {
-                offered(value, Assignment::OFFERED)?;
-                put_element(&mut self.assignments, usize::from(n), Assignment(value))?;
+                let assignment = Assignment::new(value)?;
+                put_element(&mut self.assignments, usize::from(n), assignment)?;
             }
             Setting::BootTime => {
                 if Duration::from_millis(value) == Duration::MAX {
@@ -277,14 +292,6 @@ fn consumer(entry: u32) -> Option<(NodeId, Duration)> {
     let node = NodeId::new((entry >> CONSUMER_NODE) as u8)?;
     let ms = entry & CONSUMER_MS;
     (ms != 0).then(|| (node, Duration::from_millis(ms)))
-}
-
-fn offered(value: u32, bits: u32) -> Result<(), AbortCode> {
-    if value & !bits == 0 {
-        Ok(())
-    } else {
-        Err(AbortCode::VALUE_RANGE)
-    }
 }
 
 fn element(from: &[u32], n: u8) -> u32 {

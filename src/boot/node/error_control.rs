@@ -1,0 +1,281 @@
+//! What error control tells of a node, and what follows (CiA 302-2, "Check node
+//! state", "Start error control service", "Error handler").
+
+use super::super::event::{Action, Event};
+use super::super::failure::{BootResult, Cause, Failure, Status};
+use super::super::settings::Assignment;
+use super::state::{
+    AwaitBootUp, AwaitErrorControl, AwaitReset, AwaitState, Configure, Identify, Lost, Operational,
+    Ready, Starting, State,
+};
+use super::{ATTEMPT, NodeBoot, deadline};
+use crate::frame::Frame;
+use crate::id::{CobId, FunctionCode};
+use crate::nmt::{self, Command};
+use crate::time::{Duration, Instant};
+
+/// Heartbeats of a node that may be missed before its first one is given up.
+const HEARTBEATS_AWAITED: u32 = 3;
+/// The time that a node is given to report operational, however short its
+/// heartbeat.
+const START_TIME: Duration = Duration::from_millis(100);
+/// The request for error control by a remote frame: one byte is to come.
+const GUARDING_DLC: u8 = 1;
+
+impl NodeBoot {
+    /// The node reported its NMT state: a boot-up frame, a heartbeat or the
+    /// answer to node guarding (CiA 301, 7.2.8.3.2).
+    pub(in super::super) fn on_error_control(&mut self, state: nmt::State, now: Instant) {
+        if state == nmt::State::Initialising {
+            return self.on_boot_up(now);
+        }
+        let operational = state == nmt::State::Operational;
+        match self.state {
+            State::AwaitState(_) if operational => {
+                self.state = State::Operational(Operational);
+                if core::mem::take(&mut self.lost) {
+                    self.report(Event::NodeBack(self.node.id));
+                }
+                self.done(BootResult::LeftRunning, Event::LeftRunning(self.node.id));
+            }
+            State::AwaitState(_) => self.reset(false, now),
+            State::AwaitErrorControl(_) => self.ready(),
+            State::Ready(_) | State::Starting(_) if operational && !self.held => self.operational(),
+            State::Operational(_) if !operational => self.lose(false),
+            State::GivenUp(_) => self.on_sign_of_life(now),
+            _ => {}
+        }
+    }
+
+    /// It booted, or booted again in the middle of everything: whatever was
+    /// done is gone, so all starts over.
+    fn on_boot_up(&mut self, now: Instant) {
+        match self.state {
+            State::Idle(_) | State::Lost(_) => return,
+            _ if self.is_up() => return self.lose(true),
+            State::GivenUp(_) => self.restarts = 0,
+            State::AwaitBootUp(_) | State::AwaitReset(_) => {}
+            _ if !self.fresh || !self.is(Assignment::MAY_START) => {}
+            _ => return self.restarted(now),
+        }
+        self.booted(now);
+    }
+
+    /// It booted again too soon.
+    fn restarted(&mut self, now: Instant) {
+        self.restarts += 1;
+        if self.restarts < self.network.master.sdo_tries {
+            return self.booted(now);
+        }
+        self.client.reset();
+        self.fail(Status::B, Cause::Restarts, now);
+    }
+
+    /// After the boot-up frame.
+    fn booted(&mut self, now: Instant) {
+        let restored = matches!(
+            self.state,
+            State::AwaitReset(AwaitReset { restored: true, .. })
+        );
+        let verified = matches!(self.state, State::AwaitReset(_));
+        self.client.reset();
+        self.tries = 0;
+        self.fresh = true;
+        self.report(Event::BootUp(self.node.id));
+        if !self.is(Assignment::MAY_START) {
+            return self.await_error_control(now);
+        }
+        self.send(Command::EnterPreOperational);
+        if restored {
+            self.state = State::Configure(Configure { done: 0 });
+        } else if verified {
+            self.verify();
+        } else {
+            self.state = State::Identify(Identify { item: 0 });
+        }
+    }
+
+    /// A node that was given up because nothing was heard of it is there.
+    fn on_sign_of_life(&mut self, now: Instant) {
+        let unheard = matches!(
+            self.result,
+            BootResult::Failed(Failure {
+                cause: Cause::NoBootUp | Cause::NoHeartbeat,
+                ..
+            })
+        );
+        if !self.is(Assignment::MAY_START) {
+            self.ready();
+        } else if unheard && self.is(Assignment::KEEP_ALIVE) {
+            self.state = State::Identify(Identify { item: 0 });
+        } else if unheard {
+            self.send(Command::ResetCommunication);
+            self.state = State::AwaitBootUp(AwaitBootUp {
+                until: self.attempt_end(now),
+            });
+        }
+    }
+
+    /// It was booted and is not any more. The network decides what follows.
+    pub(in super::super) fn lose(&mut self, booted: bool) {
+        if !self.is_up() {
+            return;
+        }
+        self.lost = true;
+        self.result = BootResult::Pending;
+        self.state = State::Lost(Lost { booted });
+        self.report(Event::NodeLost(self.node.id));
+    }
+
+    /// A lost node is booted again (CiA 302-2, "Error handler").
+    pub(in super::super) fn recover(&mut self, boot_time: Duration, now: Instant) {
+        let booted = match self.state {
+            State::Lost(Lost { booted }) => booted,
+            // It was put into the list meanwhile.
+            State::Idle(_) if self.is(0) => false,
+            _ => return,
+        };
+        let may_start = self.is(Assignment::MAY_START);
+        if !booted || !may_start {
+            return self.begin(boot_time, may_start, now);
+        }
+        self.held = false;
+        self.boot_deadline = deadline(boot_time, now);
+        self.restarted(now);
+    }
+
+    /// Sends a reset that was requested, and boots the node again.
+    pub(in super::super) fn reset_by_request(
+        &mut self,
+        command: Command,
+        boot_time: Duration,
+        now: Instant,
+    ) {
+        let was_up = self.is_up();
+        self.begin(boot_time, false, now);
+        if was_up {
+            self.lost = true;
+            self.report(Event::NodeLost(self.node.id));
+        }
+        self.send(command);
+    }
+
+    /// Resets this node alone in the middle of its boot-up.
+    pub(super) fn reset(&mut self, restored: bool, now: Instant) {
+        // What was restored is in force after a reset of the node
+        // (CiA 301, 7.5.2.14).
+        self.send(if restored {
+            Command::ResetNode
+        } else {
+            Command::ResetCommunication
+        });
+        self.state = State::AwaitReset(AwaitReset {
+            deadline: self.attempt_end(now),
+            restored,
+        });
+    }
+
+    fn attempt_end(&self, now: Instant) -> Instant {
+        let at_least = now + ATTEMPT;
+        self.boot_deadline
+            .map_or(at_least, |deadline| deadline.max(at_least))
+    }
+
+    /// Step 7, entered with the identity checked.
+    pub(super) fn await_state(&mut self, now: Instant) {
+        if self.patience() == Duration::ZERO {
+            return self.reset(false, now);
+        }
+        self.guard = now;
+        self.state = State::AwaitState(AwaitState {
+            deadline: now + self.patience(),
+        });
+    }
+
+    /// Step 9.
+    pub(super) fn await_error_control(&mut self, now: Instant) {
+        if self.patience() == Duration::ZERO {
+            return self.ready();
+        }
+        self.guard = now;
+        self.state = State::AwaitErrorControl(AwaitErrorControl {
+            deadline: now + self.patience(),
+        });
+    }
+
+    /// How long error control may stay away; zero if there is none.
+    pub(super) fn patience(&self) -> Duration {
+        let (period_ms, times) = match self.node.heartbeat_ms {
+            0 => (
+                self.settings.assignment.guard_time().as_millis(),
+                u32::from(self.settings.assignment.guard_retries()) + 1,
+            ),
+            period => (u32::from(period), HEARTBEATS_AWAITED),
+        };
+        Duration::from_millis(period_ms.saturating_mul(times))
+    }
+
+    fn ready(&mut self) {
+        self.state = State::Ready(Ready);
+        self.done(BootResult::Booted, Event::Ready(self.node.id));
+    }
+
+    fn done(&mut self, result: BootResult, event: Event) {
+        self.gave_up = false;
+        self.result = result;
+        self.report(event);
+    }
+
+    fn operational(&mut self) {
+        self.state = State::Operational(Operational);
+        self.restarts = 0;
+        let back = core::mem::take(&mut self.lost);
+        self.report(if back {
+            Event::NodeBack(self.node.id)
+        } else {
+            Event::Operational(self.node.id)
+        });
+    }
+
+    /// NMT start goes, or went by broadcast, to the node.
+    pub(in super::super) fn start(&mut self, alone: bool, now: Instant) {
+        if alone {
+            self.send(Command::Start);
+        }
+        self.guard = now;
+        if self.patience() == Duration::ZERO {
+            return self.operational();
+        }
+        self.state = State::Starting(Starting {
+            deadline: now + self.patience().max(START_TIME),
+        });
+    }
+
+    /// Somebody asked for another state than operational, or for operational
+    /// after that.
+    pub(in super::super) fn hold(&mut self, held: bool) {
+        if self.is_up() {
+            self.held = held;
+            if held {
+                self.state = State::Ready(Ready);
+            }
+        }
+    }
+
+    pub(super) fn guards(&self) -> bool {
+        self.state.awaits_error_control()
+            && self.node.heartbeat_ms == 0
+            && self.settings.assignment.guard_time() != Duration::ZERO
+    }
+
+    /// Node guarding: a remote frame every guard time (CiA 301, 7.2.8.3.2.1).
+    pub(super) fn ask_for_state(&mut self, now: Instant) {
+        if self.guards() && now >= self.guard {
+            self.guard = now + self.settings.assignment.guard_time();
+            let id = CobId::of(FunctionCode::ErrorControl, self.node.id);
+            if let Some(frame) = Frame::remote_frame(id, GUARDING_DLC) {
+                self.push(Action::Send(frame));
+            }
+        }
+    }
+}

@@ -1,0 +1,285 @@
+//! Boot-up of one node: CiA 302-2, "Boot slave".
+
+mod error_control;
+mod requests;
+mod state;
+
+use super::event::{Action, Event};
+use super::failure::{BootResult, Cause, Failure, Status};
+use super::settings::{Assignment, NodeSettings};
+use crate::network::{self, Network, Node};
+use crate::nmt::{Command, NodeControl};
+use crate::objects;
+use crate::sdo::Client;
+use crate::time::{Duration, Instant};
+use heapless::Deque;
+use state::{AwaitBootUp, AwaitErrorControl, AwaitReset, GivenUp, Identify, Idle, State};
+
+/// Actions that one stimulus can cause at most: an abort or a step that ends,
+/// the next request and reports.
+const OUTBOX: usize = 4;
+/// How long a boot-up frame is awaited where no boot time is set, and the pause
+/// between two attempts to reach a node.
+const ATTEMPT: Duration = Duration::from_millis(1_000);
+
+/// The boot-up of one node, and the SDO channel to it.
+#[derive(Debug)]
+pub(super) struct NodeBoot {
+    network: &'static Network,
+    node: &'static Node,
+    settings: NodeSettings,
+    client: Client,
+    state: State,
+    /// End of the boot time 1F89h; `None`: for ever.
+    boot_deadline: Option<Instant>,
+    /// When the node is asked for its state next, if it is guarded.
+    guard: Instant,
+    /// Tries of the request under way.
+    tries: u8,
+    /// Restarts in the middle of the boot-up.
+    restarts: u8,
+    /// Writes of the configuration without date and time.
+    planned: u16,
+    result: BootResult,
+    /// It failed, and was not booted since.
+    gave_up: bool,
+    /// It booted since the boot-up began, so that nothing of old runs on.
+    fresh: bool,
+    /// It was lost and has not been operational since.
+    lost: bool,
+    /// Somebody asked for another state than operational.
+    held: bool,
+    outbox: Deque<Action, OUTBOX>,
+}
+
+impl NodeBoot {
+    pub(super) fn new(
+        network: &'static Network,
+        node: &'static Node,
+        settings: NodeSettings,
+    ) -> NodeBoot {
+        NodeBoot {
+            network,
+            node,
+            settings,
+            client: Client::new(node.id, network.master.sdo_timeout),
+            state: State::Idle(Idle),
+            boot_deadline: None,
+            guard: Instant::ZERO,
+            tries: 0,
+            restarts: 0,
+            planned: u16::try_from(network::plan(network, node).count()).unwrap_or(u16::MAX),
+            result: BootResult::Pending,
+            gave_up: false,
+            fresh: false,
+            lost: false,
+            held: false,
+            outbox: Deque::new(),
+        }
+    }
+
+    pub(super) const fn set_settings(&mut self, settings: NodeSettings) {
+        self.settings = settings;
+    }
+
+    pub(super) const fn node(&self) -> &'static Node {
+        self.node
+    }
+
+    pub(super) const fn result(&self) -> BootResult {
+        self.result
+    }
+
+    pub(super) const fn is(&self, bits: u32) -> bool {
+        self.settings.assignment.has(Assignment::LISTED | bits)
+    }
+
+    /// Booted, whether started or not.
+    pub(super) const fn is_up(&self) -> bool {
+        matches!(
+            self.state,
+            State::Ready(_) | State::Starting(_) | State::Operational(_)
+        )
+    }
+
+    pub(super) const fn is_settled(&self) -> bool {
+        self.is_up() || self.gave_up || !self.is(0)
+    }
+
+    pub(super) const fn has_given_up(&self) -> bool {
+        self.gave_up
+    }
+
+    pub(super) const fn is_starting(&self) -> bool {
+        matches!(self.state, State::Starting(_))
+    }
+
+    /// Waiting to be started, and allowed to be.
+    pub(super) const fn is_startable(&self) -> bool {
+        matches!(self.state, State::Ready(_)) && self.is(Assignment::MAY_START) && !self.held
+    }
+
+    /// All that the network wants of it: operational, or booted if it is not to
+    /// be started.
+    pub(super) const fn is_complete(&self) -> bool {
+        match self.state {
+            State::Operational(_) => true,
+            State::Ready(_) => !self.is(Assignment::MAY_START),
+            _ => false,
+        }
+    }
+
+    pub(super) const fn is_lost(&self) -> bool {
+        matches!(self.state, State::Lost(_))
+    }
+
+    /// It names a serial number by which it can be found, and was never heard.
+    pub(super) fn is_missing(&self) -> bool {
+        let unheard = match self.result {
+            BootResult::Pending => matches!(self.state, State::Idle(_)),
+            BootResult::Failed(failure) => failure.cause == Cause::NoBootUp,
+            _ => false,
+        };
+        unheard && self.is(0) && self.node.identity.serial.is_some()
+    }
+
+    /// The boot-up begins. `reset`: the node is to be reset by itself, unless it
+    /// is to be kept alive.
+    pub(super) fn begin(&mut self, boot_time: Duration, reset: bool, now: Instant) {
+        self.halt();
+        self.result = BootResult::Pending;
+        self.gave_up = false;
+        self.held = false;
+        self.restarts = 0;
+        self.boot_deadline = deadline(boot_time, now);
+        if !self.is(0) {
+            self.result = BootResult::Failed(Failure {
+                status: Status::A,
+                cause: Cause::NotListed,
+            });
+            return self.report(Event::NotListed(self.node.id));
+        }
+        let keep_alive = self.is(Assignment::KEEP_ALIVE);
+        if reset && !keep_alive {
+            self.send(Command::ResetCommunication);
+        }
+        let until = self.boot_deadline.unwrap_or(now + ATTEMPT);
+        self.state = if !self.is(Assignment::MAY_START) {
+            self.guard = now;
+            State::AwaitErrorControl(AwaitErrorControl {
+                deadline: until + self.patience(),
+            })
+        } else if keep_alive {
+            State::Identify(Identify { item: 0 })
+        } else {
+            State::AwaitBootUp(AwaitBootUp { until })
+        };
+    }
+
+    /// Nothing more is done until [`begin`](Self::begin).
+    pub(super) fn halt(&mut self) {
+        self.client.reset();
+        self.state = State::Idle(Idle);
+        self.tries = 0;
+        self.fresh = false;
+    }
+
+    /// The next thing to do, if there is one now.
+    pub(super) fn poll(&mut self, now: Instant) -> Option<Action> {
+        if let Some(action) = self.outbox.pop_front() {
+            return Some(action);
+        }
+        let progress = self.client.poll(now);
+        self.on_progress(progress, now);
+        self.advance(now);
+        self.ask_for_state(now);
+        self.outbox.pop_front()
+    }
+
+    /// When [`poll`](Self::poll) has to be called again at the latest.
+    pub(super) fn next_deadline(&self) -> Option<Instant> {
+        let guard = self.guards().then_some(self.guard);
+        [self.state.deadline(), self.client.next_deadline(), guard]
+            .into_iter()
+            .flatten()
+            .min()
+    }
+
+    /// The time of a state is over.
+    fn expire(&mut self, now: Instant) {
+        match self.state {
+            State::AwaitBootUp(_) if self.boot_time_is_over(now) => {
+                self.fail(Status::B, Cause::NoBootUp, now);
+            }
+            State::Retry(_) if self.boot_time_is_over(now) => {
+                let at = objects::DEVICE_TYPE;
+                self.fail(Status::B, Cause::NoAnswer { at }, now);
+            }
+            State::AwaitBootUp(_) | State::Retry(_) | State::GivenUp(_) => {
+                self.state = State::Identify(Identify { item: 0 });
+            }
+            State::AwaitReset(AwaitReset { restored, .. }) => {
+                let status = if restored { Status::J } else { Status::B };
+                self.fail(status, Cause::NoBootUp, now);
+            }
+            State::AwaitState(_) => {
+                let status = match self.node.heartbeat_ms {
+                    0 => Status::F,
+                    _ => Status::E,
+                };
+                self.fail(status, Cause::NoState, now);
+            }
+            State::AwaitErrorControl(_) => self.fail(Status::K, Cause::NoHeartbeat, now),
+            State::Starting(_) => self.fail(Status::K, Cause::NotOperational, now),
+            _ => {}
+        }
+    }
+
+    fn boot_time_is_over(&self, now: Instant) -> bool {
+        self.boot_deadline.is_some_and(|deadline| now >= deadline)
+    }
+
+    /// Sends an NMT command to this node alone.
+    #[inline(never)]
+    pub(super) fn send(&mut self, command: Command) {
+        self.push(Action::Send(
+            NodeControl::node(command, self.node.id).frame(),
+        ));
+    }
+
+    #[inline(never)]
+    fn fail(&mut self, status: Status, cause: Cause, now: Instant) {
+        let result = BootResult::Failed(Failure { status, cause });
+        let forever = status == Status::B && !self.is(Assignment::MANDATORY);
+        self.state = State::GivenUp(GivenUp {
+            retry: forever.then_some(now + ATTEMPT),
+        });
+        self.tries = 0;
+        self.fresh = false;
+        // What is tried for ever is told once.
+        if !self.gave_up || self.result.status() != Some(status) {
+            self.report(Event::Failed(self.node.id, Failure { status, cause }));
+        }
+        self.gave_up = true;
+        self.result = result;
+    }
+
+    #[inline(never)]
+    fn report(&mut self, event: Event) {
+        self.push(Action::Report(event));
+    }
+
+    /// Not inlined, here and elsewhere: it is called from everywhere, and flash is
+    /// scarcer than time.
+    #[inline(never)]
+    fn push(&mut self, action: Action) {
+        // The outbox holds what one stimulus can cause; it is emptied before
+        // the next one.
+        let _ = self.outbox.push_back(action);
+    }
+}
+
+/// The end of a boot time; zero lasts for ever.
+fn deadline(boot_time: Duration, now: Instant) -> Option<Instant> {
+    (boot_time != Duration::ZERO).then(|| now + boot_time)
+}

@@ -1,0 +1,264 @@
+//! What is read from a node and written to it (CiA 302-2, "Boot slave", steps 2
+//! to 6 and 8).
+
+use super::super::event::{Action, Event};
+use super::super::failure::{Cause, Status};
+use super::super::settings::Assignment;
+use super::state::{Configure, Identify, Restore, Retry, State, Verify};
+use super::{ATTEMPT, NodeBoot};
+use crate::frame::Frame;
+use crate::id::Address;
+use crate::network::{self, ConfigWrite};
+use crate::objects;
+use crate::sdo::{Progress, SdoError};
+use crate::time::Instant;
+
+/// Configuration writes between two progress reports.
+const REPORT_EVERY: u16 = 16;
+/// What 1011h wants to be told: "load" (CiA 301, 7.5.2.14).
+const LOAD: u32 = u32::from_le_bytes(*b"load");
+/// Where the node says when it was configured (CiA 301, 7.5.2.23).
+const SIGNATURE: [Address; 2] = [objects::CONFIGURATION_DATE, objects::CONFIGURATION_TIME];
+
+impl NodeBoot {
+    /// A frame from the node's SDO server.
+    pub(in super::super) fn on_sdo(&mut self, frame: &Frame, now: Instant) {
+        let progress = self.client.on_frame(frame, now);
+        self.on_progress(progress, now);
+    }
+
+    /// Sends the request that the state wants, if the channel is free.
+    pub(super) fn advance(&mut self, now: Instant) {
+        while self.advance_once(now) {}
+    }
+
+    /// Whether the state changed to one that may have something to send.
+    fn advance_once(&mut self, now: Instant) -> bool {
+        if self
+            .state
+            .deadline()
+            .is_some_and(|deadline| now >= deadline)
+        {
+            self.expire(now);
+            return matches!(self.state, State::Identify(_));
+        }
+        match self.state {
+            State::Identify(Identify { item }) => match self.expectation(item) {
+                // 1000h is read even if it may be anything: it shows that the
+                // node answers.
+                Some((_, None, _)) if item != 0 => {
+                    self.state = State::Identify(Identify { item: item + 1 });
+                    return true;
+                }
+                Some((at, ..)) => self.read(at, now),
+                None => {
+                    self.report(Event::Identified(self.node.id));
+                    if self.is(Assignment::KEEP_ALIVE) && !self.fresh {
+                        self.await_state(now);
+                    } else {
+                        self.verify();
+                        return true;
+                    }
+                }
+            },
+            State::Verify(Verify { item }) => match SIGNATURE.get(item) {
+                Some(at) => self.read(*at, now),
+                None => {
+                    self.report(Event::Configured(self.node.id));
+                    self.await_error_control(now);
+                }
+            },
+            State::Restore(Restore) => {
+                let at = Address::new(objects::RESTORE_PARAMETERS, self.settings.restore);
+                self.write(ConfigWrite::u32(at, LOAD), now);
+            }
+            State::Configure(Configure { done }) => match self.planned(done) {
+                Some(write) => self.write(write, now),
+                None => {
+                    self.report(Event::Configured(self.node.id));
+                    self.await_error_control(now);
+                }
+            },
+            _ => {}
+        }
+        false
+    }
+
+    /// Step 8, entered by a node that may be configured.
+    pub(super) fn verify(&mut self) {
+        if self.signature_len() == 0 {
+            self.begin_configuration();
+        } else {
+            self.state = State::Verify(Verify { item: 0 });
+        }
+    }
+
+    fn begin_configuration(&mut self) {
+        self.state = if self.is(Assignment::RESTORE) && self.settings.restore != 0 {
+            State::Restore(Restore)
+        } else {
+            State::Configure(Configure { done: 0 })
+        };
+    }
+
+    /// The write number `n` of the configuration. Date and time come last, so
+    /// that they stand for all of it.
+    fn planned(&self, n: u16) -> Option<ConfigWrite> {
+        match n.checked_sub(self.planned) {
+            None => network::planned(self.network, self.node, usize::from(n)),
+            Some(item) if item >= self.signature_len() => None,
+            Some(item) => {
+                let item = usize::from(item);
+                let at = SIGNATURE.get(item)?;
+                let value = self.settings.configured.get(item)?;
+                Some(ConfigWrite::u32(*at, *value))
+            }
+        }
+    }
+
+    /// How many entries of 1020h are compared and written.
+    fn signature_len(&self) -> u16 {
+        match self.settings.configured {
+            [0, 0] => 0,
+            _ => SIGNATURE.len() as u16,
+        }
+    }
+
+    fn read(&mut self, at: Address, now: Instant) {
+        let request = self.client.upload(at, now);
+        self.send_request(request);
+    }
+
+    fn write(&mut self, write: ConfigWrite, now: Instant) {
+        let bytes = write.bytes();
+        let data = bytes.get(..write.len()).unwrap_or(&bytes);
+        let request = self.client.download(write.at, data, now);
+        self.send_request(request);
+    }
+
+    /// Busy is no error: the channel is in use or in quarantine, and the
+    /// request is made again when it is free.
+    fn send_request<E>(&mut self, request: Result<Frame, E>) {
+        if let Ok(frame) = request {
+            self.push(Action::Send(frame));
+        }
+    }
+
+    pub(super) fn on_progress(&mut self, progress: Progress, now: Instant) {
+        match progress {
+            Progress::Nothing => {}
+            Progress::Send(frame) => self.push(Action::Send(frame)),
+            Progress::Done(response) => {
+                self.tries = 0;
+                self.on_response(response.data(), now);
+                // The next request follows at once, not at the next poll, so
+                // that the node's latency is all that is waited for.
+                self.advance(now);
+            }
+            Progress::Failed(error, abort) => {
+                if let Some(abort) = abort {
+                    self.push(Action::Send(abort));
+                }
+                self.on_sdo_error(error, now);
+            }
+        }
+    }
+
+    fn on_response(&mut self, data: &[u8], now: Instant) {
+        let found = <[u8; 4]>::try_from(data).map(u32::from_le_bytes);
+        match self.state {
+            State::Identify(Identify { item }) => {
+                let Some((at, expected, status)) = self.expectation(item) else {
+                    return;
+                };
+                match found {
+                    Ok(found) => {
+                        let Some(expected) = expected.filter(|expected| *expected != found) else {
+                            self.state = State::Identify(Identify { item: item + 1 });
+                            return;
+                        };
+                        let cause = Cause::Mismatch {
+                            at,
+                            expected,
+                            found,
+                        };
+                        self.fail(status, cause, now);
+                    }
+                    Err(_) => self.fail(status, Cause::Garbled { at }, now),
+                }
+            }
+            State::Verify(Verify { item }) => {
+                if found.ok().as_ref() == self.settings.configured.get(item) {
+                    self.state = State::Verify(Verify { item: item + 1 });
+                } else {
+                    self.begin_configuration();
+                }
+            }
+            State::Restore(_) => self.reset(true, now),
+            State::Configure(Configure { done }) => {
+                let done = done + 1;
+                self.state = State::Configure(Configure { done });
+                if done % REPORT_EVERY == 0 {
+                    let node = self.node.id;
+                    let total = self.planned + self.signature_len();
+                    self.report(Event::Configuring { node, done, total });
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn on_sdo_error(&mut self, error: SdoError, now: Instant) {
+        let cause = match error {
+            SdoError::Aborted { at, code } => Cause::Refused { at, code },
+            SdoError::Timeout { at, .. } => Cause::NoAnswer { at },
+            other => Cause::Garbled {
+                at: other.address(),
+            },
+        };
+        let final_word = matches!(cause, Cause::Refused { .. });
+        self.tries += 1;
+        if !final_word && self.tries < self.network.master.sdo_tries {
+            return;
+        }
+        self.tries = 0;
+        match self.state {
+            State::Identify(Identify { item: 0 }) if !final_word => self.unreached(cause, now),
+            State::Identify(Identify { item }) => {
+                let status = self.expectation(item).map_or(Status::B, |(_, _, s)| s);
+                self.fail(status, cause, now);
+            }
+            // It does not tell when it was configured: it is configured.
+            State::Verify(_) => self.begin_configuration(),
+            State::Restore(_) | State::Configure(_) => self.fail(Status::J, cause, now),
+            _ => {}
+        }
+    }
+
+    /// No answer to 1000h. A mandatory node has the boot time, an optional one
+    /// holds nobody up.
+    fn unreached(&mut self, cause: Cause, now: Instant) {
+        let mandatory = self.is(Assignment::MANDATORY);
+        if mandatory && !self.has_given_up() && !self.boot_time_is_over(now) {
+            let at = now + ATTEMPT;
+            let at = self.boot_deadline.map_or(at, |deadline| deadline.min(at));
+            self.state = State::Retry(Retry { at });
+        } else {
+            self.fail(Status::B, cause, now);
+        }
+    }
+
+    /// What is read, what it must be, and what it is called when it is not.
+    fn expectation(&self, item: usize) -> Option<(Address, Option<u32>, Status)> {
+        let identity = &self.node.identity;
+        [
+            (objects::DEVICE_TYPE, identity.device_type, Status::C),
+            (objects::VENDOR_ID, identity.vendor, Status::D),
+            (objects::PRODUCT_CODE, identity.product, Status::M),
+            (objects::REVISION_NUMBER, identity.revision, Status::N),
+            (objects::SERIAL_NUMBER, identity.serial, Status::O),
+        ]
+        .get(item)
+        .copied()
+    }
+}

@@ -1,0 +1,143 @@
+//! The states of the boot-up of one node: one type each (CiA 302-2, "Boot
+//! slave").
+
+use crate::time::Instant;
+
+/// The network has not begun, or has come to its end.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Idle;
+
+/// Reset communication was sent: the boot-up frame is awaited, at the longest
+/// for the boot time 1F89h (CiA 302-2, "Boot slave", before step 2).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct AwaitBootUp {
+    pub(super) until: Instant,
+}
+
+/// Reading 1000h and 1018h and comparing them with 1F84h .. 1F88h (CiA 302-2,
+/// "Boot slave", steps 2 to 6; B, C, D, M, N, O).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Identify {
+    pub(super) item: usize,
+}
+
+/// No answer to 1000h: tried again, a mandatory node until the boot time is
+/// over (CiA 302-2, "Boot slave", step 2).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Retry {
+    pub(super) at: Instant,
+}
+
+/// A node that is to be kept alive is asked for its NMT state (CiA 302-2,
+/// "Check node state", step 7; E, F).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct AwaitState {
+    pub(super) deadline: Instant,
+}
+
+/// The node alone was reset on the way (CiA 302-2, "Check node state" and
+/// "Restore configuration").
+#[derive(Clone, Copy, Debug)]
+pub(super) struct AwaitReset {
+    pub(super) deadline: Instant,
+    /// Its parameters were restored; else it is yet to be verified.
+    pub(super) restored: bool,
+}
+
+/// Comparing 1020h with 1F26h and 1F27h (CiA 302-2, "Check configuration",
+/// step 8).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Verify {
+    pub(super) item: usize,
+}
+
+/// Writing "load" to 1011h (CiA 302-2, "Restore configuration", step 8; J).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Restore;
+
+/// Writing the configuration 1F22h (CiA 302-2, "Update configuration", step 8;
+/// J).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Configure {
+    pub(super) done: u16,
+}
+
+/// Waiting for the first heartbeat or answer to node guarding, for which the
+/// boot-up frame does not count (CiA 302-2, "Start error control service",
+/// step 9; K).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct AwaitErrorControl {
+    pub(super) deadline: Instant,
+}
+
+/// Booted: may be started (CiA 302-2, "Boot slave", its end).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ready;
+
+/// NMT start was sent (CiA 302-2, "NMT start-up").
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Starting {
+    pub(super) deadline: Instant,
+}
+
+/// It reports operational.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Operational;
+
+/// It was booted and is no longer what it should be (CiA 302-2, "Error
+/// handler"). What follows, the network decides.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lost {
+    /// It told so itself by a boot-up frame.
+    pub(super) booted: bool,
+}
+
+/// Ended with a letter. An optional node that does not answer is tried for ever
+/// (CiA 302-2, "Boot slave", step 2).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct GivenUp {
+    pub(super) retry: Option<Instant>,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) enum State {
+    Idle(Idle),
+    AwaitBootUp(AwaitBootUp),
+    Identify(Identify),
+    Retry(Retry),
+    AwaitState(AwaitState),
+    AwaitReset(AwaitReset),
+    Verify(Verify),
+    Restore(Restore),
+    Configure(Configure),
+    AwaitErrorControl(AwaitErrorControl),
+    Ready(Ready),
+    Starting(Starting),
+    Operational(Operational),
+    Lost(Lost),
+    GivenUp(GivenUp),
+}
+
+impl State {
+    /// When time alone leads out.
+    pub(super) const fn deadline(&self) -> Option<Instant> {
+        match *self {
+            State::AwaitBootUp(AwaitBootUp { until }) => Some(until),
+            State::Retry(Retry { at }) => Some(at),
+            State::AwaitState(AwaitState { deadline })
+            | State::AwaitReset(AwaitReset { deadline, .. })
+            | State::AwaitErrorControl(AwaitErrorControl { deadline })
+            | State::Starting(Starting { deadline }) => Some(deadline),
+            State::GivenUp(GivenUp { retry }) => retry,
+            _ => None,
+        }
+    }
+
+    /// Whether an answer to node guarding would lead on.
+    pub(super) const fn awaits_error_control(&self) -> bool {
+        matches!(
+            self,
+            State::AwaitState(_) | State::AwaitErrorControl(_) | State::Starting(_)
+        )
+    }
+}

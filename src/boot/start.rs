@@ -1,0 +1,226 @@
+//! Start of the network and what follows: CiA 302-2, "NMT start-up" and "Error
+//! handler".
+
+use super::event::{Action, Event};
+use super::network::NetworkBoot;
+use super::node::NodeBoot;
+use super::phase::Phase;
+use super::settings::{Assignment, Startup};
+use crate::nmt::{Command, NodeControl};
+use crate::time::{Duration, Instant};
+
+impl<const N: usize> NetworkBoot<N> {
+    pub(super) fn advance(&mut self, now: Instant) {
+        match self.phase {
+            Phase::Silent { until } if now >= until => {
+                if self.scan_first && !self.scanned {
+                    self.scan();
+                } else {
+                    self.reset_all(now);
+                }
+            }
+            Phase::BusOff { until } if now >= until => {
+                self.push(Action::RestartController);
+                self.report(Event::BusRestarted);
+                let until = now + self.network.master.silence;
+                self.phase = self.halted.unwrap_or(Phase::Silent { until });
+            }
+            Phase::Scanning => self.advance_scan(now),
+            phase if phase.listens() => {
+                self.handle_lost(now);
+                self.advance_start(now);
+            }
+            _ => {}
+        }
+    }
+
+    fn advance_start(&mut self, now: Instant) {
+        match self.phase {
+            Phase::Booting => self.finish_booting(now),
+            Phase::Synchronising { until } if now >= until => self.start(now),
+            Phase::Starting if !self.nodes.iter().any(NodeBoot::is_starting) => {
+                if self.mandatory_failed() && !self.ran {
+                    self.fail();
+                } else {
+                    self.phase = Phase::Running;
+                    self.tell_ready();
+                }
+            }
+            Phase::Running if !self.ran && self.mandatory_failed() => self.fail(),
+            Phase::Running => {
+                if !self.startup.has(Startup::NO_START) && self.mandatory_up() {
+                    self.send_start(now);
+                }
+                self.tell_ready();
+            }
+            _ => {}
+        }
+    }
+
+    /// Whoever is to be kept alive is reset only if it turns out not to run.
+    pub(super) fn reset_all(&mut self, now: Instant) {
+        let kept = |boot: &NodeBoot| boot.is(Assignment::KEEP_ALIVE);
+        let alone = self.nodes.iter().any(kept);
+        if !alone {
+            self.broadcast(Command::ResetCommunication);
+        }
+        self.report(Event::ResetSent);
+        self.begin_all(alone, now);
+    }
+
+    pub(super) fn begin_all(&mut self, reset: bool, now: Instant) {
+        for node in &mut self.nodes {
+            node.begin(self.boot_time, reset, now);
+        }
+        self.ordered = false;
+        self.phase = Phase::Booting;
+        self.tell_ready();
+    }
+
+    fn scan(&mut self) {
+        self.scanned = true;
+        self.report(Event::Scanning);
+        self.phase = Phase::Scanning;
+    }
+
+    fn advance_scan(&mut self, now: Instant) {
+        let nodes = &self.nodes;
+        let missing = |place| nodes.get(place).is_some_and(NodeBoot::is_missing);
+        if let Some(action) = self.factory.poll(now, self.network.nodes, missing) {
+            return self.push(action);
+        }
+        match self.factory.finished() {
+            None => {}
+            Some(given) if given || self.scan_first => self.reset_all(now),
+            // The wait was in vain: what was found out before stands.
+            Some(_) => {
+                self.phase = Phase::Booting;
+                self.advance_start(now);
+            }
+        }
+    }
+
+    /// All nodes are waited for even when one has failed, so that one run
+    /// names everything that is wrong.
+    fn finish_booting(&mut self, now: Instant) {
+        if !self.nodes.iter().all(NodeBoot::is_settled) {
+            return;
+        }
+        if !self.scanned && self.nodes.iter().any(NodeBoot::is_missing) {
+            return self.scan();
+        }
+        if self.mandatory_up() {
+            if self.startup.has(Startup::NOT_BY_ITSELF) && !self.ordered {
+                self.report(Event::StartAwaited);
+                self.phase = Phase::AwaitingOrder;
+            } else {
+                self.synchronise(now);
+            }
+        } else if !self.ran {
+            self.fail();
+        }
+    }
+
+    pub(super) fn synchronise(&mut self, now: Instant) {
+        self.push(Action::ProduceSync);
+        let syncs = u32::from(self.network.master.syncs_before_start);
+        let span = self.network.cycle.as_micros().saturating_mul(syncs);
+        self.phase = Phase::Synchronising {
+            until: now + Duration::from_micros(span),
+        };
+    }
+
+    fn start(&mut self, now: Instant) {
+        if !self.mandatory_up() {
+            // One was lost on the way.
+            self.phase = Phase::Booting;
+        } else if self.startup.has(Startup::NO_START) {
+            self.report(Event::StartLeft);
+            self.ran = true;
+            self.phase = Phase::Running;
+        } else {
+            self.send_start(now);
+            self.report(Event::StartSent);
+            self.phase = Phase::Starting;
+        }
+    }
+
+    /// Starts those that wait for it: by broadcast where all do (1F80h, bit 1),
+    /// else one by one, since a node that failed must stay where it is.
+    pub(super) fn send_start(&mut self, now: Instant) {
+        let all = self.startup.has(Startup::START_ALL)
+            && !self.nodes.is_empty()
+            && self.nodes.iter().all(NodeBoot::is_startable);
+        if all {
+            self.broadcast(Command::Start);
+        }
+        for node in self.nodes.iter_mut().filter(|node| node.is_startable()) {
+            node.start(!all, now);
+        }
+    }
+
+    /// What the error of a node means for the others (CiA 302-2, "Error
+    /// handler"): as 1F80h says if the node is mandatory, else nothing.
+    fn handle_lost(&mut self, now: Instant) {
+        let error = |boot: &NodeBoot| boot.is_lost() && boot.is(Assignment::MANDATORY);
+        if self.phase == Phase::Running && self.nodes.iter().any(error) {
+            if self.startup.has(Startup::STOP_ALL) {
+                self.broadcast(Command::Stop);
+                self.report(Event::NetworkStopped);
+                return self.halt(Phase::Stopped);
+            }
+            if self.startup.has(Startup::RESET_ALL) {
+                return self.reset_all(now);
+            }
+        }
+        for node in &mut self.nodes {
+            node.recover(self.boot_time, now);
+        }
+    }
+
+    pub(super) fn mandatory_up(&self) -> bool {
+        self.nodes
+            .iter()
+            .all(|boot| boot.is_up() || !boot.is(Assignment::MANDATORY))
+    }
+
+    fn mandatory_failed(&self) -> bool {
+        self.nodes
+            .iter()
+            .any(|boot| boot.has_given_up() && boot.is(Assignment::MANDATORY))
+    }
+
+    fn fail(&mut self) {
+        self.report(Event::NetworkFailed);
+        self.halt(Phase::Failed);
+    }
+
+    fn halt(&mut self, phase: Phase) {
+        for node in &mut self.nodes {
+            node.halt();
+        }
+        self.phase = phase;
+        self.tell_ready();
+    }
+
+    /// Tells when the network becomes ready, and when it ceases to be.
+    pub(super) fn tell_ready(&mut self) {
+        let complete = |boot: &NodeBoot| boot.is_complete() || !boot.is(Assignment::MANDATORY);
+        let ready = self.phase == Phase::Running && self.nodes.iter().all(complete);
+        if ready == self.ready {
+            return;
+        }
+        self.ready = ready;
+        self.ran |= ready;
+        self.report(if ready {
+            Event::NetworkReady
+        } else {
+            Event::NetworkDown
+        });
+    }
+
+    #[inline(never)]
+    pub(super) fn broadcast(&mut self, command: Command) {
+        self.push(Action::Send(NodeControl::all(command).frame()));
+    }
+}
