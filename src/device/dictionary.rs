@@ -15,7 +15,6 @@ use crate::sdo::AbortCode;
 use crate::store;
 use crate::time::Instant;
 use crate::time_of_day::{Clock, TimeOfDay};
-use core::fmt::Write as _;
 use heapless::Deque;
 
 /// Events that may wait. One SDO write causes one; they are fetched after each.
@@ -194,19 +193,28 @@ impl<B: Board, const N: usize> View<'_, B, N> {
 
     fn write_words(&self, item: Item, window: &mut Window<'_>) -> Result<(), AbortCode> {
         let dictionary = &*self.dictionary;
-        let told = match item {
+        match item {
             Item::BootWords(node) => match dictionary.node(node) {
-                Some((known, record)) => write!(window, "{}: {}", known.name, record.status),
-                None => window.write_str("not in the network"),
+                Some((known, record)) => {
+                    window.text(known.name);
+                    window.text(": ");
+                    record.status.write(window);
+                }
+                None => window.text("not in the network"),
             },
             Item::EmcyWords(node) => match dictionary.node(node).map(|(_, r)| r.emcy.get(0)) {
-                Some(Some(emcy)) => write!(window, "{}", emcy.code),
-                Some(None) => window.write_str("no emergency"),
-                None => window.write_str("not in the network"),
+                Some(Some(emcy)) => {
+                    window.hexadecimal(emcy.code.0);
+                    window.text("h (");
+                    window.text(emcy.code.text());
+                    window.text(")");
+                }
+                Some(None) => window.text("no emergency"),
+                None => window.text("not in the network"),
             },
             _ => return Err(AbortCode::UNSUPPORTED_ACCESS),
-        };
-        told.map_err(|_| AbortCode::GENERAL)
+        }
+        Ok(())
     }
 }
 

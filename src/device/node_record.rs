@@ -1,9 +1,9 @@
 //! What the master knows of a node: boot-up, NMT state, emergencies.
 
+use super::window::Window;
 use crate::boot::{Cause, Event, Failure, Status};
 use crate::emcy::{Emcy, History};
 use crate::nmt::State;
-use core::fmt;
 
 /// Emergencies kept per node.
 pub(super) const HISTORY: usize = 4;
@@ -72,24 +72,36 @@ impl NodeStatus {
     }
 }
 
-impl fmt::Display for NodeStatus {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            NodeStatus::Idle => f.write_str("not started yet"),
-            NodeStatus::Awaited => f.write_str("boot-up frame awaited"),
-            NodeStatus::Identifying => f.write_str("identity is checked"),
-            NodeStatus::Configuring { done, total: 0 } => write!(f, "configuring, {done} writes"),
+impl NodeStatus {
+    /// In words.
+    pub(super) fn write(&self, window: &mut Window<'_>) {
+        window.text(match self {
+            NodeStatus::Idle => "not started yet",
+            NodeStatus::Awaited => "boot-up frame awaited",
+            NodeStatus::Identifying => "identity is checked",
+            NodeStatus::Configuring { .. } => "configuring, ",
+            NodeStatus::Configured => "configured, heartbeat awaited",
+            NodeStatus::Ready => "ready to be started",
+            NodeStatus::Operational => "operational",
+            NodeStatus::LeftRunning => "was operational already and is left running",
+            NodeStatus::Lost => "lost, to be booted again",
+            NodeStatus::Failed(failure) => words(&failure.cause),
+        });
+        match *self {
             NodeStatus::Configuring { done, total } => {
-                write!(f, "configuring, {done} of {total} writes")
+                window.decimal(done);
+                if total != 0 {
+                    window.text(" of ");
+                    window.decimal(total);
+                }
+                window.text(" writes");
             }
-            NodeStatus::Configured => f.write_str("configured, heartbeat awaited"),
-            NodeStatus::Ready => f.write_str("ready to be started"),
-            NodeStatus::Operational => f.write_str("operational"),
-            NodeStatus::LeftRunning => f.write_str("was operational already and is left running"),
-            NodeStatus::Lost => f.write_str("lost, to be booted again"),
-            NodeStatus::Failed(Failure { status, cause }) => {
-                write!(f, "{} (boot status {})", words(cause), status.letter())
+            NodeStatus::Failed(failure) => {
+                window.text(" (boot status ");
+                window.put(&[failure.status as u8]);
+                window.text(")");
             }
+            _ => {}
         }
     }
 }

@@ -2,7 +2,6 @@
 
 use crate::network::ConfigWrite;
 use crate::od::Chunk;
-use core::fmt;
 
 /// Takes in the whole and keeps the piece from an offset on.
 pub(super) struct Window<'a> {
@@ -32,6 +31,40 @@ impl Window<'_> {
         }
     }
 
+    pub(super) fn text(&mut self, text: &str) {
+        self.put(text.as_bytes());
+    }
+
+    /// In decimal, without the formatting of the standard library: that would
+    /// take 3 KiB of flash.
+    pub(super) fn decimal(&mut self, number: u16) {
+        self.digits(number, 10, 1);
+    }
+
+    /// In four hexadecimal digits.
+    pub(super) fn hexadecimal(&mut self, number: u16) {
+        self.digits(number, 16, 4);
+    }
+
+    fn digits(&mut self, number: u16, base: u16, at_least: usize) {
+        let mut digits = [b'0'; 5];
+        let (mut rest, mut used) = (number, 0);
+        for digit in digits.iter_mut().rev() {
+            if rest == 0 && used >= at_least {
+                break;
+            }
+            let value = (rest % base) as u8;
+            *digit = if value < 10 {
+                b'0' + value
+            } else {
+                b'A' + value - 10
+            };
+            rest /= base;
+            used += 1;
+        }
+        self.put(digits.get(digits.len() - used..).unwrap_or(&digits));
+    }
+
     pub(super) fn chunk(&self) -> Chunk {
         let rest = self.total.saturating_sub(self.offset);
         let len = rest.min(self.buf.len());
@@ -40,13 +73,6 @@ impl Window<'_> {
             size: u32::try_from(self.total).ok(),
             last: len == rest,
         }
-    }
-}
-
-impl fmt::Write for Window<'_> {
-    fn write_str(&mut self, text: &str) -> fmt::Result {
-        self.put(text.as_bytes());
-        Ok(())
     }
 }
 

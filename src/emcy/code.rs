@@ -61,6 +61,11 @@ impl EmcyCode {
         self.exact().or_else(|| self.range())
     }
 
+    /// What the code means, or that nobody knows.
+    pub fn text(self) -> &'static str {
+        self.meaning().unwrap_or(UNKNOWN)
+    }
+
     fn exact(self) -> Option<&'static str> {
         TEXTS
             .binary_search_by_key(&self.0, |&(code, _)| code)
@@ -79,7 +84,7 @@ impl EmcyCode {
 
 impl fmt::Display for EmcyCode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let text = self.meaning().unwrap_or(UNKNOWN);
+        let text = self.text();
         write!(f, "{:04X}h ({text})", self.0)
     }
 }
@@ -87,7 +92,7 @@ impl fmt::Display for EmcyCode {
 #[cfg(feature = "defmt")]
 impl defmt::Format for EmcyCode {
     fn format(&self, f: defmt::Formatter<'_>) {
-        let text = self.meaning().unwrap_or(UNKNOWN);
+        let text = self.text();
         defmt::write!(f, "{=u16:04X}h ({=str})", self.0, text)
     }
 }
