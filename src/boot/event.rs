@@ -3,7 +3,7 @@
 use super::failure::Failure;
 use crate::frame::Frame;
 use crate::id::NodeId;
-use crate::lss::{LssAddress, LssError};
+use crate::lss::LssAddress;
 use crate::words::in_words;
 
 /// What the caller has to do next.
@@ -89,8 +89,17 @@ pub enum Event {
         /// Whether the node keeps it when its supply is off.
         stored: bool,
     },
-    /// The node was found, but took no node-ID.
-    IdFailed(NodeId, LssError),
+    /// The node was found, but refused its node-ID (CiA 305, 3.9.2).
+    IdRefused {
+        /// The node-ID.
+        node: NodeId,
+        /// 1: out of range; 255: see `specific`.
+        error: u8,
+        /// Error of the manufacturer.
+        specific: u8,
+    },
+    /// The node was found, but did not answer when it was given its node-ID.
+    IdUnanswered(NodeId),
     /// A node without node-ID that the network does not name.
     Stranger(LssAddress),
 }
@@ -111,7 +120,8 @@ impl Event {
             | Event::NodeLost(node)
             | Event::NodeBack(node)
             | Event::IdGiven { node, .. }
-            | Event::IdFailed(node, _) => Some(node),
+            | Event::IdRefused { node, .. }
+            | Event::IdUnanswered(node) => Some(node),
             _ => None,
         }
     }
@@ -152,8 +162,15 @@ in_words!(Event {
     Event::IdGiven { node, stored: false } => (
         "node {}: found by its serial number, node-ID given, but the node does not store it", node
     ),
-    Event::IdFailed(node, error) => ("node {}: took no node-ID: {}", node, error),
-    Event::Stranger(address) => (
-        "a node without node-ID is not in the network description: {}", address
+    Event::IdRefused { node, error, specific } => (
+        "node {}: found by its serial number, refused its node-ID with error {}, specific error {}",
+        node, error, specific
+    ),
+    Event::IdUnanswered(node) => (
+        "node {}: found by its serial number, did not answer to its node-ID; reset the board to try again", node
+    ),
+    Event::Stranger(LssAddress { vendor, product, revision, serial }) => (
+        "a node without node-ID is not in the network description: vendor {:08X}h, product {:08X}h, revision {:08X}h, serial {:08X}h",
+        vendor, product, revision, serial
     ),
 });

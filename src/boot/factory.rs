@@ -1,9 +1,13 @@
 //! Giving node-IDs to drives that have none, by the serial numbers that the
 //! network names (CiA 305).
+//!
+//! Only the few services that this needs are here; [`LssMaster`] has them all.
+//!
+//! [`LssMaster`]: crate::lss::LssMaster
 
 use super::event::{Action, Event};
 use crate::frame::Frame;
-use crate::lss::{LssMaster, Mode, Outcome, Progress, ScanPart, Service};
+use crate::lss::{Answer, ConfigurationResult, Fastscan, Mode, Request, ScanPart, Verdict};
 use crate::network::Node;
 use crate::time::{Duration, Instant};
 
@@ -24,28 +28,33 @@ enum Step {
     Store,
     /// Is there anybody else?
     Strangers,
+    /// Nothing is left to be found.
+    Over,
 }
 
 /// The search for the nodes of a network that have no node-ID.
 #[derive(Debug)]
 pub(super) struct Factory {
-    lss: LssMaster,
     step: Step,
-    /// The request of the step is out.
-    asked: bool,
+    /// A request of the step is out, until then.
+    asked: Option<Instant>,
+    scan: Fastscan,
+    /// Somebody answered to the question that is out.
+    yes: bool,
     /// The node looked for.
     place: usize,
     given: bool,
-    /// Nothing is left to be found.
+    /// What [`Step::Leave`] leads to.
     over: bool,
 }
 
 impl Factory {
     pub(super) const fn new() -> Factory {
         Factory {
-            lss: LssMaster::new(SCAN_TIMEOUT),
             step: Step::Leave,
-            asked: false,
+            asked: None,
+            scan: Fastscan::new([ScanPart::Unknown; 4]),
+            yes: false,
             place: 0,
             given: false,
             over: false,
@@ -53,17 +62,31 @@ impl Factory {
     }
 
     /// `Some` at the end: whether any node was given a node-ID.
-    pub(super) fn finished(&self) -> Option<bool> {
-        (self.over && !self.asked && !matches!(self.step, Step::Leave)).then_some(self.given)
+    pub(super) const fn finished(&self) -> Option<bool> {
+        match self.step {
+            Step::Over => Some(self.given),
+            _ => None,
+        }
     }
 
-    pub(super) fn next_deadline(&self) -> Option<Instant> {
-        self.lss.next_deadline()
+    pub(super) const fn next_deadline(&self) -> Option<Instant> {
+        self.asked
     }
 
+    /// Takes in the answer of an LSS slave.
     pub(super) fn on_frame(&mut self, frame: &Frame, nodes: &'static [Node]) -> Option<Action> {
-        let progress = self.lss.on_frame(frame);
-        self.on_progress(progress, nodes)
+        match (self.step, Answer::decode(frame)?) {
+            // Several nodes may answer, each in its own time: the next question
+            // waits until all have had theirs.
+            (Step::Scan | Step::Strangers, Answer::Identified) => {
+                self.yes = true;
+                None
+            }
+            (Step::Give, Answer::NodeId(result)) | (Step::Store, Answer::Store(result)) => {
+                self.configured(Some(result), nodes)
+            }
+            _ => None,
+        }
     }
 
     /// The next thing to do. `wanted` tells which nodes are looked for.
@@ -73,30 +96,15 @@ impl Factory {
         nodes: &'static [Node],
         wanted: impl Fn(usize) -> bool,
     ) -> Option<Action> {
-        loop {
-            if self.asked {
-                match self.lss.poll(now) {
-                    Progress::Nothing => return None,
-                    progress => {
-                        if let Some(action) = self.on_progress(progress, nodes) {
-                            return Some(action);
-                        }
-                    }
-                }
-            } else if self.finished().is_some() {
+        if let Some(until) = self.asked {
+            if now < until {
                 return None;
-            } else {
-                return self.ask(now, nodes, &wanted);
+            }
+            let action = self.time_is_over(now, nodes);
+            if action.is_some() || self.asked.is_some() {
+                return action;
             }
         }
-    }
-
-    fn ask(
-        &mut self,
-        now: Instant,
-        nodes: &'static [Node],
-        wanted: &impl Fn(usize) -> bool,
-    ) -> Option<Action> {
         if matches!(self.step, Step::Scan) {
             match (self.place..nodes.len()).find(|place| wanted(*place)) {
                 Some(place) => self.place = place,
@@ -104,64 +112,89 @@ impl Factory {
             }
         }
         let node = nodes.get(self.place);
-        let (service, timeout) = match self.step {
-            Step::Leave => (Service::SwitchGlobal(Mode::Waiting), ANSWER_TIMEOUT),
-            Step::Scan => (Service::Fastscan(node.map(parts)?), SCAN_TIMEOUT),
-            Step::Give => (Service::ConfigureNodeId(Some(node?.id)), ANSWER_TIMEOUT),
-            Step::Store => (Service::Store, ANSWER_TIMEOUT),
-            Step::Strangers => (Service::Fastscan([ScanPart::Unknown; 4]), SCAN_TIMEOUT),
+        let (request, time) = match self.step {
+            Step::Leave => (Request::SwitchGlobal(Mode::Waiting), Duration::ZERO),
+            Step::Scan | Step::Strangers => {
+                let known = node.filter(|_| matches!(self.step, Step::Scan)).map(parts);
+                self.scan = Fastscan::new(known.unwrap_or([ScanPart::Unknown; 4]));
+                (self.scan.question(), SCAN_TIMEOUT)
+            }
+            Step::Give => (Request::NodeId(Some(node?.id)), ANSWER_TIMEOUT),
+            Step::Store => (Request::Store, ANSWER_TIMEOUT),
+            Step::Over => return None,
         };
-        self.lss = LssMaster::new(timeout);
-        let frame = self.lss.start(service, now).ok()?;
-        self.asked = true;
-        Some(Action::Send(frame))
+        Some(self.ask(request, now + time))
     }
 
-    fn on_progress(&mut self, progress: Progress, nodes: &'static [Node]) -> Option<Action> {
-        let result = match progress {
-            Progress::Nothing | Progress::SwitchBitRate => return None,
-            Progress::Send(frame) => return Some(Action::Send(frame)),
-            Progress::Done(outcome) => Ok(outcome),
-            Progress::Failed(error) => Err(error),
+    fn ask(&mut self, request: Request, until: Instant) -> Action {
+        self.asked = Some(until);
+        self.yes = false;
+        Action::Send(request.frame())
+    }
+
+    fn time_is_over(&mut self, now: Instant, nodes: &'static [Node]) -> Option<Action> {
+        let strangers = match self.step {
+            Step::Scan => false,
+            Step::Strangers => true,
+            Step::Leave => {
+                self.enter(if self.over { Step::Over } else { Step::Scan });
+                return None;
+            }
+            _ => return self.configured(None, nodes),
         };
-        self.asked = false;
-        let node = nodes.get(self.place).map(|node| node.id);
-        let (step, event) = match (self.step, result) {
-            (Step::Leave, _) => (Step::Scan, None),
-            (Step::Scan, Ok(Outcome::Found(_))) => (Step::Give, None),
-            // Not among them, or not to be understood: on to the next.
-            (Step::Scan, Err(_)) => {
+        match self.scan.answer(self.yes) {
+            Verdict::Continue => {
+                let question = self.scan.question();
+                return Some(self.ask(question, now + SCAN_TIMEOUT));
+            }
+            Verdict::Found(address) if strangers => {
+                self.over = true;
+                self.enter(Step::Leave);
+                return Some(Action::Report(Event::Stranger(address)));
+            }
+            Verdict::Found(_) => self.enter(Step::Give),
+            Verdict::Lost(_) if !strangers => {
+                // It is not among them.
                 self.place += 1;
-                (Step::Scan, None)
+                self.enter(Step::Scan);
             }
-            (Step::Give, Ok(_)) => (Step::Store, None),
-            (Step::Give, Err(error)) => {
-                (self.leave(), node.map(|node| Event::IdFailed(node, error)))
-            }
-            (Step::Store, result) => {
-                self.given = true;
-                let stored = result.is_ok();
-                (
-                    self.leave(),
-                    node.map(|node| Event::IdGiven { node, stored }),
-                )
-            }
-            (Step::Strangers, Ok(Outcome::Found(address))) => {
-                self.over = true;
-                (Step::Leave, Some(Event::Stranger(address)))
-            }
-            (Step::Scan | Step::Strangers, _) => {
-                self.over = true;
-                (Step::Scan, None)
-            }
-        };
-        self.step = step;
-        event.map(Action::Report)
+            Verdict::Lost(_) | Verdict::Nobody => self.enter(Step::Over),
+        }
+        None
     }
 
-    fn leave(&mut self) -> Step {
+    /// What came of giving or storing a node-ID; `None` if there was no answer.
+    fn configured(
+        &mut self,
+        result: Option<ConfigurationResult>,
+        nodes: &'static [Node],
+    ) -> Option<Action> {
+        let node = nodes.get(self.place)?.id;
+        let ok = result.is_some_and(ConfigurationResult::is_ok);
+        let event = match (self.step, result) {
+            (Step::Give, _) if ok => {
+                self.enter(Step::Store);
+                return None;
+            }
+            (Step::Give, Some(ConfigurationResult { error, specific })) => Event::IdRefused {
+                node,
+                error,
+                specific,
+            },
+            (Step::Give, None) => Event::IdUnanswered(node),
+            _ => {
+                self.given = true;
+                Event::IdGiven { node, stored: ok }
+            }
+        };
         self.place += 1;
-        Step::Leave
+        self.enter(Step::Leave);
+        Some(Action::Report(event))
+    }
+
+    const fn enter(&mut self, step: Step) {
+        self.step = step;
+        self.asked = None;
     }
 }
 

@@ -24,7 +24,7 @@ mod app {
         axes::Axes,
         control::Control,
         counters::{self, Counts},
-        duties::{act, obey, serve},
+        duties::{act, obey, order_boot, serve},
         filters::{self, Handler},
         leds,
         log::{Log, News, UPTIME_MS},
@@ -575,6 +575,7 @@ mod app {
                 own.group(&event);
                 log.group(&event);
             }
+            let mut patience = design::CONFIGURATOR_PERIOD;
             while serve(own, local.requests, now(*local.clock), &mut cx.shared) {
                 while let Some(event) = own.device.take_event() {
                     obey(
@@ -584,10 +585,14 @@ mod app {
                         local.orders_to,
                         &mut cx.shared,
                     );
+                    if order_boot(&event, boot, own, now(*local.clock)) {
+                        // What it asks for is done in the next round.
+                        patience = Duration::ZERO;
+                    }
                 }
             }
             roll::check_in(Task::SdoConfigurator);
-            let latest = now(*local.clock) + design::CONFIGURATOR_PERIOD;
+            let latest = now(*local.clock) + patience;
             let next = [boot.next_deadline(), own.device.next_deadline()];
             let next = next.into_iter().flatten().fold(latest, Instant::min);
             wake::at(next.as_micros() as u32);

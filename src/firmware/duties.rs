@@ -8,7 +8,7 @@ use crate::{
 };
 use canmaster::{
     Frame,
-    boot::{self, Action},
+    boot::{self, Action, NetworkBoot},
     design::{self, AXES},
     device::{Event, Setting},
     master::TpdoSlots,
@@ -65,14 +65,35 @@ pub(crate) fn obey(
                 let _ = orders.enqueue(order);
             });
         }
-        Event::Nmt(control) => send(control.frame(), shared),
-        Event::Configure(target) => {
-            // It is configured whenever it boots.
-            let command = Command::ResetCommunication;
-            send(NodeControl { command, target }.frame(), shared);
-        }
         _ => {}
     }
+}
+
+/// Hands on what a client has caused to the boot-up, which sends all NMT
+/// commands. `true`: it has something to do.
+pub(crate) fn order_boot(
+    event: &Event,
+    boot: &mut NetworkBoot<AXES>,
+    own: &OwnNode,
+    now: Instant,
+) -> bool {
+    let control = match *event {
+        Event::Nmt(control) => control,
+        // It is configured whenever it boots.
+        Event::Configure(target) => NodeControl {
+            command: Command::ResetCommunication,
+            target,
+        },
+        Event::Changed(Setting::Startup | Setting::Assignment(_) | Setting::BootTime) => {
+            boot.set_settings(&own.device.settings().boot());
+            return true;
+        }
+        _ => return false,
+    };
+    if let Err(refusal) = boot.request(control, now) {
+        defmt::warn!("NMT request refused: {}", refusal);
+    }
+    true
 }
 
 /// Takes over a setting that a client has changed.

@@ -20,7 +20,7 @@ pub enum ScanPart {
 
 /// The questions of one scan and what follows from the answers.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Fastscan {
+pub(crate) struct Fastscan {
     parts: [ScanPart; 4],
     found: LssAddress,
     at: Question,
@@ -38,7 +38,7 @@ enum Question {
 
 /// What an answer, or its absence, leads to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Verdict {
+pub(crate) enum Verdict {
     Continue,
     /// The node with this address is in configuration.
     Found(LssAddress),
@@ -49,7 +49,7 @@ pub(super) enum Verdict {
 }
 
 impl Fastscan {
-    pub(super) const fn new(parts: [ScanPart; 4]) -> Fastscan {
+    pub(crate) const fn new(parts: [ScanPart; 4]) -> Fastscan {
         Fastscan {
             parts,
             found: LssAddress {
@@ -62,7 +62,7 @@ impl Fastscan {
         }
     }
 
-    pub(super) fn question(&self) -> Request {
+    pub(crate) fn question(&self) -> Request {
         match self.at {
             Question::Anybody => Request::Fastscan {
                 id: 0,
@@ -86,7 +86,7 @@ impl Fastscan {
         }
     }
 
-    pub(super) fn answer(&mut self, yes: bool) -> Verdict {
+    pub(crate) fn answer(&mut self, yes: bool) -> Verdict {
         match (self.at, yes) {
             (Question::Anybody, false) => return Verdict::Nobody,
             (Question::Anybody, true) => self.begin(Part::Vendor),

@@ -12,5 +12,6 @@ pub use address::{LssAddress, Part};
 pub use bit_rate::BitRate;
 pub use command::{Answer, ConfigurationResult, Mode, Request};
 pub use fastscan::ScanPart;
+pub(crate) use fastscan::{Fastscan, Verdict};
 pub use master::{LssError, LssMaster, Outcome, Progress, Service};
 pub use slave::{Device, LssSlave, SlaveEvent};
