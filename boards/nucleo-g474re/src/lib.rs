@@ -20,6 +20,7 @@ mod serial_number;
 pub mod timers;
 pub mod watchdog;
 
+mod memory;
 mod message_ram;
 
 pub use serial_number::serial_number;
