@@ -267,6 +267,7 @@ impl<const N: usize> Device<N> {
     /// no room for another frame.
     pub fn poll(&mut self, now: Instant, board: &mut impl Board) -> Option<Frame> {
         let dictionary = &mut self.dictionary;
+        dictionary.clock.advance(now);
         let settings = &dictionary.settings;
         let emcy = dictionary.errors.poll(
             now,

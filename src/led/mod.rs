@@ -58,7 +58,9 @@ impl Pattern {
         let period = self.period().as_micros();
         let phase = match period {
             0 => 0,
-            period => (now.as_micros() % period as u64) as u32,
+            // The lower half of the clock is enough: once in 71 minutes, when it
+            // starts again, one flash is cut short.
+            period => now.as_micros() as u32 % period,
         };
         let first_half = phase < period / 2;
         match self {

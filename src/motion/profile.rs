@@ -112,21 +112,22 @@ impl Timing {
             return Ok(Timing::default());
         }
         let distance = distance.unsigned_abs() as f32;
-        let ramps = ceil(velocity / acceleration)? as f32 + ceil(velocity / deceleration)? as f32;
+        let ramps = whole_cycles(velocity / acceleration)? as f32
+            + whole_cycles(velocity / deceleration)? as f32;
         if distance >= velocity * ramps / 2.0 {
             return Ok(Timing {
-                accelerate: ceil(velocity / acceleration)?,
-                cruise: ceil(distance / velocity - ramps / 2.0)?,
-                decelerate: ceil(velocity / deceleration)?,
+                accelerate: whole_cycles(velocity / acceleration)?,
+                cruise: whole_cycles(distance / velocity - ramps / 2.0)?,
+                decelerate: whole_cycles(velocity / deceleration)?,
             });
         }
         let peak = square_root(
             2.0 * distance * acceleration * deceleration / (acceleration + deceleration),
         );
         Ok(Timing {
-            accelerate: ceil(peak / acceleration)?.max(1),
+            accelerate: whole_cycles(peak / acceleration)?.max(1),
             cruise: 0,
-            decelerate: ceil(peak / deceleration)?.max(1),
+            decelerate: whole_cycles(peak / deceleration)?.max(1),
         })
     }
 
@@ -147,7 +148,7 @@ impl Timing {
 }
 
 /// The smallest whole number of cycles that is at least `x`.
-fn ceil(x: f32) -> Result<u32, NotFeasible> {
+pub(super) fn whole_cycles(x: f32) -> Result<u32, NotFeasible> {
     if !(0.0..LONGEST_PHASE).contains(&x) {
         return Err(NotFeasible);
     }

@@ -35,6 +35,19 @@ impl TimeOfDay {
         }
     }
 
+    /// The time this much later, at most a day. 65536 days end in 2163; then the
+    /// count starts again, as it does on the wire.
+    const fn after_ms(self, ms: u32) -> TimeOfDay {
+        let ms = self.ms + ms;
+        if ms < MS_PER_DAY {
+            return TimeOfDay { ms, ..self };
+        }
+        TimeOfDay {
+            days: self.days.wrapping_add(1),
+            ms: ms - MS_PER_DAY,
+        }
+    }
+
     /// As it stands on the wire and in the object dictionary.
     pub const fn encode(self) -> [u8; SIZE] {
         let [a, b, c, d] = (self.ms & MS_MASK).to_le_bytes();

@@ -1,11 +1,13 @@
 //! The clock of a device without one, and the producer of TIME.
 
-use super::{MS_PER_DAY, TimeOfDay};
+use super::TimeOfDay;
 use crate::frame::Frame;
 use crate::id::CobId;
 use crate::time::{Duration, Instant};
 
-const US_PER_MS: u64 = 1000;
+const US_PER_MS: u32 = 1000;
+const MS_PER_HOUR: u32 = 3_600_000;
+const US_PER_HOUR: u32 = MS_PER_HOUR * US_PER_MS;
 
 /// A clock that runs from the moment it is set.
 #[derive(Clone, Copy, Debug, Default)]
@@ -27,15 +29,21 @@ impl Clock {
     /// The time; `None` before it was set.
     pub fn time(&self, now: Instant) -> Option<TimeOfDay> {
         let (time, at) = self.set?;
-        let passed = now.as_micros().saturating_sub(at.as_micros()) / US_PER_MS;
-        let ms = u64::from(time.ms) + passed;
-        let day = u64::from(MS_PER_DAY);
-        Some(TimeOfDay {
-            // 65536 days end in 2163; then the count starts again, as it does
-            // on the wire.
-            days: time.days.wrapping_add((ms / day) as u16),
-            ms: (ms % day) as u32,
-        })
+        let passed = now.as_micros().saturating_sub(at.as_micros());
+        let passed = u32::try_from(passed).unwrap_or(u32::MAX);
+        Some(time.after_ms(passed / US_PER_MS))
+    }
+
+    /// Lets an hour pass, if one has: to be called at least once an hour. What
+    /// [`Clock::time`] has to divide then fits 32 bits, which a controller does
+    /// in one instruction.
+    pub fn advance(&mut self, now: Instant) {
+        if let Some((time, at)) = &mut self.set
+            && now.as_micros().saturating_sub(at.as_micros()) >= u64::from(US_PER_HOUR)
+        {
+            *at = *at + Duration::from_micros(US_PER_HOUR);
+            *time = time.after_ms(MS_PER_HOUR);
+        }
     }
 }
 

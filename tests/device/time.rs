@@ -83,7 +83,11 @@ fn midnight() {
     clock.set(TimeOfDay::new(9, 86_399_999).unwrap(), ms(10));
     assert_eq!(clock.time(ms(10)), TimeOfDay::new(9, 86_399_999));
     assert_eq!(clock.time(ms(11)), TimeOfDay::new(10, 0));
+    for hour in 1..=72 {
+        clock.advance(ms(11 + hour * 3_600_000));
+    }
     assert_eq!(clock.time(ms(11 + 3 * 86_400_000)), TimeOfDay::new(13, 0));
+    clock.advance(Instant::from_micros(u64::MAX));
     assert!(clock.time(Instant::from_micros(u64::MAX)).is_some());
 }
 

@@ -222,7 +222,7 @@ impl Axis {
         self.velocity = if total == 0 {
             0
         } else {
-            (i64::from(self.ramp_from) * i64::from(left) / i64::from(total)) as i32
+            (self.ramp_from as f32 * (left as f32 / total as f32)) as i32
         };
         if total > 0 {
             let slope = self.ramp_from.unsigned_abs() as f32 / total as f32;

@@ -26,6 +26,7 @@ pub use event::{FaultCause, GroupEvent, GroupState, Refusal};
 use heapless::Deque;
 
 use self::axis::Axis;
+use super::profile::whole_cycles;
 use super::program::{self, PlanError, Step};
 use super::{Profile, Ramp, Reference};
 use crate::cia402::Goal;
@@ -314,11 +315,10 @@ impl<const N: usize> Group<N> {
 
     /// Whole cycles to stop from a speed in rpm.
     fn stop_cycles(&self, rpm: u32) -> u32 {
-        const SECOND_US: u64 = 1_000_000;
-        let per_cycle =
-            u64::from(self.config.stop_deceleration) * u64::from(self.config.cycle.as_micros());
-        let cycles = (u64::from(rpm) * SECOND_US).div_ceil(per_cycle.max(1));
-        u32::try_from(cycles).unwrap_or(u32::MAX)
+        const SECOND_US: f32 = 1e6;
+        let per_cycle = self.config.stop_deceleration as f32
+            * (self.config.cycle.as_micros() as f32 / SECOND_US);
+        whole_cycles(rpm as f32 / per_cycle).unwrap_or(u32::MAX)
     }
 
     /// What goes on by itself in each state.
