@@ -1,6 +1,7 @@
 //! The firmware's constants, each with its reason. What belongs to the network
 //! rather than to the firmware is in [`crate::network`].
 
+use crate::sync::SyncLimits;
 use crate::time::Duration;
 
 /// Axes of the group.
@@ -36,9 +37,15 @@ pub const TX_QUEUE: usize = 32;
 /// cannot wait.
 pub const OWN_FRAMES: usize = 8;
 
-/// The shortest SYNC period (1006h), in microseconds: the deadline and as much
-/// again for the RPDOs.
-pub const SHORTEST_CYCLE_US: u32 = 2 * TPDO_DEADLINE_US as u32;
+/// What the firmware can do of 1006h and 1007h. The shortest period is the
+/// deadline of the TPDOs and as much again for the RPDOs; the longest is what the
+/// 16 bits of the deadline's timer count. The window has to hold the deadline,
+/// twelve RPDOs at worst (1.6 ms) and a frame that is on the bus.
+pub const SYNC_LIMITS: SyncLimits = SyncLimits {
+    shortest_period: 2 * TPDO_DEADLINE_US as u32,
+    longest_period: u16::MAX as u32,
+    shortest_window: TPDO_DEADLINE_US as u32 + 2_000,
+};
 
 /// Changed settings that may wait for `network`: those of every node at once,
 /// and one that the ring leaves empty.

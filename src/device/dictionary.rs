@@ -1,15 +1,16 @@
 //! The dictionary itself: from an entry to its value and back.
 
-use super::found::{Found, Item, Lookup};
 use super::node_record::{NodeRecord, NodeStatus};
-use super::settings::{Setting, Settings, nodes};
+use super::pdo::{Mirrored, Process};
+use super::settings::{RESTORE_ALL, Setting, Settings, nodes};
+use super::table::{Item, Row, TABLE};
 use super::window::{Window, concise_dcf};
-use super::{Board, Description, Event, communication, index, manager, pdo};
-use crate::emcy;
-use crate::id::{Address, NodeId};
+use super::{Board, Description, Event};
+use crate::emcy::{self, EmcyCobId};
+use crate::id::{Address, CobId, FunctionCode, NodeId};
 use crate::network::{self, Network, Node};
 use crate::nmt::{Command, NodeControl, State, Target};
-use crate::od::{Chunk, Entry, ObjectDictionary, Value, read_bytes};
+use crate::od::{Access, Chunk, DataType, Entry, Mappable, ObjectDictionary, Value, read_bytes};
 use crate::pdo::Direction;
 use crate::sdo::AbortCode;
 use crate::store;
@@ -25,8 +26,8 @@ const EVENTS: usize = 4;
 const SAVE: u32 = 0x6576_6173;
 const LOAD: u32 = 0x6461_6F6C;
 const CONFIGURE: u32 = 0x666E_6F63;
-/// What 1010h and 1011h read as: on command, not by itself.
-const ON_COMMAND: u8 = 1;
+/// Bit 31 of a COB-ID: there is none.
+const NOT_USED: u32 = 1 << 31;
 
 /// Values and state behind the entries.
 #[derive(Debug)]
@@ -34,6 +35,8 @@ pub(super) struct Dictionary<const N: usize> {
     pub(super) description: Description,
     pub(super) network: &'static Network,
     pub(super) settings: Settings<N>,
+    /// 1F80h, bit 0, as it was when the device started.
+    pub(super) is_master: bool,
     pub(super) errors: emcy::Producer,
     pub(super) state: State,
     pub(super) status: u32,
@@ -43,20 +46,131 @@ pub(super) struct Dictionary<const N: usize> {
     pub(super) events: Deque<Event, EVENTS>,
 }
 
+/// An entry, and what its value comes from.
+#[derive(Clone, Copy)]
+struct Found {
+    item: Item,
+    data_type: DataType,
+    access: Access,
+    sub: u8,
+    /// Of the object in its row of the table.
+    place: u16,
+    at: u16,
+}
+
+impl Found {
+    /// The node that it is about, if it is about one.
+    fn node(&self) -> Option<NodeId> {
+        NodeId::new(match self.item {
+            Item::EmcyCount | Item::EmcyHistory | Item::Process => self.place as u8,
+            _ => self.sub,
+        })
+    }
+
+    /// Where in a record without gaps it is, counted from 0.
+    fn n(&self) -> usize {
+        usize::from(self.sub).wrapping_sub(1)
+    }
+}
+
 impl<const N: usize> Dictionary<N> {
-    fn find(&self, at: Address) -> Lookup {
-        let (index, sub) = (at.index.0, at.sub.0);
-        let network = self.network;
-        match index {
-            index::DEVICE_TYPE..=index::SDO_CLIENTS_LAST => {
-                communication::find::<N>(&self.description, network, index, sub)
+    fn find(&self, at: Address) -> Result<Found, AbortCode> {
+        let (at, sub) = (at.index.0, at.sub.0);
+        let mut highest = None;
+        for row in &TABLE {
+            let Some(place) = row.place(at) else { continue };
+            let found = Found {
+                item: row.item,
+                data_type: row.data_type,
+                access: row.access,
+                sub,
+                place,
+                at,
+            };
+            let Some(last) = self.last_sub(row, &found) else {
+                continue;
+            };
+            if (row.sub..=last).contains(&sub) {
+                return Ok(self.refine(found));
             }
-            index::CONCISE_DCF..=index::EMCY_HISTORY_LAST => {
-                manager::find::<N>(network, index, sub)
-            }
-            index::PROCESS..=index::PROCESS_LAST => pdo::find_process(network, index, sub),
-            _ => pdo::find(network, index, sub),
+            highest = Some(last);
         }
+        match highest {
+            None => Err(AbortCode::NO_SUCH_OBJECT),
+            Some(last) if sub == 0 => Ok(Found {
+                item: Item::Highest,
+                data_type: DataType::Unsigned8,
+                access: Access::Constant,
+                sub: last,
+                place: 0,
+                at,
+            }),
+            Some(_) => Err(AbortCode::NO_SUCH_SUB_INDEX),
+        }
+    }
+
+    /// The last entry of this row that the object has; `None` if there is no such
+    /// object.
+    fn last_sub(&self, row: &Row, found: &Found) -> Option<u8> {
+        let network = self.network;
+        let last = row.last_sub;
+        match found.item {
+            Item::Setting(Setting::ConsumerHeartbeat(_)) => Some(nodes::<N>(network)),
+            Item::SdoClient | Item::SdoClientNode => {
+                let client = network.nodes.get(usize::from(found.place));
+                client.map(|_| last)
+            }
+            Item::PdoCobId | Item::PdoTransmission => {
+                Mirrored::find(network, found.at).map(|_| last)
+            }
+            Item::PdoMapping => {
+                let mirrored = Mirrored::find(network, found.at);
+                mirrored.map(|mirrored| mirrored.pdo.mapping.len() as u8)
+            }
+            Item::EmcyCount | Item::EmcyHistory => self.node(found.node()?).map(|_| last),
+            Item::Process => self
+                .node(found.node()?)
+                .map(|(node, _)| Process::count(node)),
+            _ => Some(last),
+        }
+    }
+
+    /// What the table cannot say of an entry that exists.
+    fn refine(&self, found: Found) -> Found {
+        let place = || Some(self.network.find(found.node()?)?.0);
+        let (item, access) = match found.item {
+            Item::Setting(Setting::ConsumerHeartbeat(_)) => (
+                Item::Setting(Setting::ConsumerHeartbeat(found.n() as u8)),
+                found.access,
+            ),
+            Item::Setting(Setting::Assignment(_)) => {
+                match place().filter(|place| *place < usize::from(nodes::<N>(self.network))) {
+                    Some(place) => (
+                        Item::Setting(Setting::Assignment(place as u8)),
+                        found.access,
+                    ),
+                    None => (Item::Zero, Access::Constant),
+                }
+            }
+            item => (item, found.access),
+        };
+        let data_type = match item {
+            Item::Process => self
+                .process(&found)
+                .map_or(found.data_type, |process| process.data_type()),
+            _ => found.data_type,
+        };
+        Found {
+            item,
+            access,
+            data_type,
+            ..found
+        }
+    }
+
+    fn process(&self, found: &Found) -> Option<Process> {
+        let (node, _) = self.node(found.node()?)?;
+        Process::find(node, found.sub)
     }
 
     fn node(&self, node: NodeId) -> Option<(&'static Node, &NodeRecord)> {
@@ -82,8 +196,7 @@ impl<const N: usize> Dictionary<N> {
         if self.events.is_full() {
             return Err(AbortCode::OUT_OF_MEMORY);
         }
-        let shortest = self.description.shortest_cycle_us;
-        self.settings.set(setting, value, shortest)?;
+        self.settings.set(setting, value, &self.description.sync)?;
         self.push(Event::Changed(setting))
     }
 
@@ -97,12 +210,22 @@ impl<const N: usize> Dictionary<N> {
             127 => Command::EnterPreOperational,
             _ => return Err(AbortCode::VALUE_RANGE),
         };
+        let myself = node == Some(self.network.master.node);
+        let forbidden = if myself {
+            // The axes would be left without their master.
+            self.axes_enabled && command != Command::Start
+        } else {
+            !self.is_master
+        };
+        if forbidden {
+            return Err(AbortCode::DEVICE_STATE);
+        }
         let target = node.map_or(Target::All, Target::Node);
         self.push(Event::Nmt(NodeControl { command, target }))
     }
 
-    /// 1010h and 1011h: an erase stops the core for some 22 ms, so that no axis
-    /// may be enabled meanwhile.
+    /// 1010h and 1011h: the device does nothing else for some 25 ms, so that no
+    /// axis may be enabled meanwhile.
     fn store(
         &mut self,
         board: &mut impl Board,
@@ -113,7 +236,7 @@ impl<const N: usize> Dictionary<N> {
         if given != wanted {
             return Err(AbortCode::CANNOT_STORE);
         }
-        if self.axes_enabled {
+        if self.axes_enabled || !board.can_save() {
             return Err(AbortCode::DEVICE_STATE);
         }
         let mut buf = [0; store::CAPACITY];
@@ -122,7 +245,13 @@ impl<const N: usize> Dictionary<N> {
         } else {
             self.settings.encode(self.network, &mut buf)?
         };
-        board.save(buf.get(..len).unwrap_or(&[]))
+        let saved = board.save(buf.get(..len).unwrap_or(&[]));
+        if saved.is_err() {
+            self.errors.raise(super::MasterError::Storage.emcy());
+        } else {
+            self.errors.clear(super::MasterError::Storage.emcy());
+        }
+        saved
     }
 }
 
@@ -134,146 +263,206 @@ pub(super) struct View<'a, B, const N: usize> {
 }
 
 impl<B: Board, const N: usize> View<'_, B, N> {
-    fn value(&mut self, found: Found) -> Result<Value, AbortCode> {
+    /// The bytes of a value of fixed size.
+    fn value(&mut self, found: &Found) -> Result<u64, AbortCode> {
         let dictionary = &*self.dictionary;
-        let data_type = found.entry.data_type;
-        let number = |number: u32| Ok(Value::new(data_type, i64::from(number)));
-        match found.item {
-            Item::Number(value) => number(value),
-            Item::Setting(setting) => number(dictionary.settings.get(setting)),
-            Item::ErrorRegister => number(u32::from(dictionary.errors.register().0)),
-            Item::Status => number(dictionary.status),
-            Item::ErrorCount => number(dictionary.errors.field().len() as u32),
-            Item::ErrorField(age) => dictionary
+        let network = dictionary.network;
+        let known = found.node().and_then(|id| dictionary.node(id));
+        let record = known.map(|(_, record)| record);
+        let pdo = || Mirrored::find(network, found.at).ok_or(AbortCode::NO_SUCH_OBJECT);
+        let number: u32 = match found.item {
+            Item::Highest => found.sub.into(),
+            Item::Setting(setting) => dictionary.settings.get(setting),
+            Item::DeviceType => dictionary.description.device_type,
+            Item::ErrorRegister => dictionary.errors.register().0.into(),
+            Item::Status => dictionary.status,
+            Item::ErrorCount => dictionary.errors.field().len() as u32,
+            Item::ErrorField => *dictionary
                 .errors
                 .field()
-                .get(usize::from(age))
-                .map(|error| Value::from(*error))
-                .ok_or(AbortCode::NO_DATA),
-            Item::Save | Item::Restore => number(u32::from(ON_COMMAND)),
-            Item::NmtRequest(node) => {
-                let record = node.and_then(|node| dictionary.node(node));
-                number(record.map_or(0, |(_, record)| u32::from(record.presence.code())))
+                .get(found.n())
+                .ok_or(AbortCode::NO_DATA)?,
+            // On command, not by itself.
+            Item::Save | Item::Restore => self.board.can_save().into(),
+            Item::Identity => {
+                let identity = &dictionary.description.identity;
+                match found.sub {
+                    1 => identity.vendor,
+                    2 => identity.product,
+                    3 => identity.revision,
+                    _ => identity.serial,
+                }
             }
-            Item::BootLetter(node) => {
-                let letter = dictionary.node(node).map_or(0, |(_, r)| r.status.letter());
-                number(u32::from(letter))
+            Item::EmcyConsumer => known.map_or(NOT_USED, |(n, _)| EmcyCobId::predefined(n.id).0),
+            Item::SdoServer => sdo_channel(found.sub, network.master.node),
+            Item::SdoClient | Item::SdoClientNode => {
+                let client = network.nodes.get(usize::from(found.place));
+                let node = client.ok_or(AbortCode::NO_SUCH_OBJECT)?.id;
+                match found.item {
+                    Item::SdoClient => sdo_channel(found.sub, node),
+                    _ => node.get().into(),
+                }
             }
-            Item::EmcyCount(node) => {
-                let count = dictionary.node(node).map_or(0, |(_, r)| r.emcy.len());
-                number(count as u32)
+            Item::PdoCobId => pdo()?.cob_id(),
+            Item::PdoTransmission => pdo()?.pdo.transmission.code().into(),
+            Item::PdoMapping => {
+                let entry = pdo()?.mapped(found.sub);
+                entry.ok_or(AbortCode::NO_SUCH_SUB_INDEX)?.0
             }
-            Item::EmcyField(node, age) => dictionary
-                .node(node)
-                .and_then(|(_, record)| record.emcy.get(usize::from(age)))
-                .map(|emcy| Value::from(u64::from_le_bytes(emcy.encode())))
-                .ok_or(AbortCode::NO_DATA),
+            Item::Zero => 0,
+            Item::NmtRequest if found.node() == Some(network.master.node) => {
+                dictionary.state.code().into()
+            }
+            Item::NmtRequest => record.map_or(0, |record| record.presence.code()).into(),
+            Item::Expected => {
+                let identity = known.map(|(node, _)| &node.identity);
+                let expected = identity.and_then(|identity| match found.place {
+                    0 => identity.device_type,
+                    1 => identity.vendor,
+                    2 => identity.product,
+                    3 => identity.revision,
+                    _ => identity.serial,
+                });
+                expected.unwrap_or(0)
+            }
+            Item::RestoreConfiguration => known.map_or(0, |_| RESTORE_ALL).into(),
+            Item::BootLetter => record.map_or(0, |record| record.status.letter()).into(),
+            Item::EmcyCount => record.map_or(0, |record| record.emcy.len() as u32),
+            Item::EmcyHistory => {
+                let emcy = record.and_then(|record| record.emcy.get(found.n()));
+                return Ok(u64::from_le_bytes(emcy.ok_or(AbortCode::NO_DATA)?.encode()));
+            }
             Item::Clock => {
                 let time = dictionary.clock.time(self.now).ok_or(AbortCode::NO_DATA)?;
-                Value::from_bytes(data_type, &time.encode())
+                let [a, b, c, d, e, f] = time.encode();
+                return Ok(u64::from_le_bytes([a, b, c, d, e, f, 0, 0]));
             }
-            Item::Process(process) => {
+            Item::Process => {
+                let process = dictionary.process(found).ok_or(AbortCode::NO_DATA)?;
                 let (node, pdo) = (process.node, process.number);
                 let data = match process.direction {
                     Direction::Transmit => self.board.tpdo(node, pdo),
                     Direction::Receive => self.board.rpdo(node, pdo),
                 };
-                let value = process.extract(data).to_le_bytes();
-                let size = data_type.size().unwrap_or(value.len());
-                Value::from_bytes(data_type, value.get(..size).unwrap_or(&value))
+                return Ok(process.extract(data));
             }
             // Strings and domains are read piece by piece, 1F25h not at all.
-            Item::Text(_)
-            | Item::ConciseDcf(_)
-            | Item::BootWords(_)
-            | Item::EmcyWords(_)
-            | Item::Configure(_) => Err(AbortCode::UNSUPPORTED_ACCESS),
-        }
+            Item::DeviceName
+            | Item::HardwareVersion
+            | Item::SoftwareVersion
+            | Item::ConciseDcf
+            | Item::BootWords
+            | Item::EmcyWords
+            | Item::Configure => return Err(AbortCode::UNSUPPORTED_ACCESS),
+        };
+        Ok(number.into())
     }
+}
 
-    fn write_words(&self, item: Item, window: &mut Window<'_>) -> Result<(), AbortCode> {
-        let dictionary = &*self.dictionary;
-        match item {
-            Item::BootWords(node) => match dictionary.node(node) {
-                Some((known, record)) => {
-                    window.text(known.name);
-                    window.text(": ");
-                    record.status.write(window);
-                }
-                None => window.text("not in the network"),
-            },
-            Item::EmcyWords(node) => match dictionary.node(node).map(|(_, r)| r.emcy.get(0)) {
-                Some(Some(emcy)) => {
-                    window.hexadecimal(emcy.code.0);
-                    window.text("h (");
-                    window.text(emcy.code.text());
-                    window.text(")");
-                }
-                Some(None) => window.text("no emergency"),
-                None => window.text("not in the network"),
-            },
-            _ => return Err(AbortCode::UNSUPPORTED_ACCESS),
-        }
-        Ok(())
-    }
+/// The identifiers of a server: client to server, server to client
+/// (CiA 301, 7.5.2.33, 7.5.2.34).
+fn sdo_channel(sub: u8, server: NodeId) -> u32 {
+    let function = match sub {
+        1 => FunctionCode::SdoRequest,
+        _ => FunctionCode::SdoResponse,
+    };
+    CobId::of(function, server).get().into()
 }
 
 impl<B: Board, const N: usize> ObjectDictionary for View<'_, B, N> {
     fn entry(&self, at: Address) -> Result<Entry, AbortCode> {
-        Ok(self.dictionary.find(at)?.entry)
+        let found = self.dictionary.find(at)?;
+        let entry = Entry::new(found.data_type, found.access);
+        let process = match found.item {
+            Item::Process => self.dictionary.process(&found),
+            _ => None,
+        };
+        Ok(match process.map(|process| process.direction) {
+            None => entry,
+            Some(Direction::Transmit) => entry.mappable(Mappable::Rpdo),
+            Some(Direction::Receive) => entry.mappable(Mappable::Tpdo),
+        })
     }
 
     fn get(&mut self, at: Address) -> Result<Value, AbortCode> {
         let found = self.dictionary.find(at)?;
-        self.value(found)
+        let value = self.value(&found)?;
+        Ok(Value::new(found.data_type, value as i64))
     }
 
     fn set(&mut self, at: Address, value: Value) -> Result<(), AbortCode> {
         let dictionary = &mut *self.dictionary;
         let number = value.as_u32();
-        match dictionary.find(at)?.item {
-            Item::Setting(setting) => dictionary.change(setting, number),
-            Item::ErrorCount => {
-                dictionary.errors.clear_field();
-                Ok(())
+        let found = dictionary.find(at)?;
+        // 80h, all nodes, is not a node-ID.
+        let node = found.node();
+        let target = node.map_or(Target::All, Target::Node);
+        match found.item {
+            Item::Setting(setting) => return dictionary.change(setting, number),
+            // Only 0 can be written, which clears the field.
+            Item::ErrorCount | Item::EmcyCount if number != 0 => {
+                return Err(AbortCode::VALUE_RANGE);
             }
-            Item::Save => dictionary.store(self.board, (number, SAVE), false),
-            Item::Restore => dictionary.store(self.board, (number, LOAD), true),
-            Item::NmtRequest(node) => dictionary.request_nmt(node, value.as_u8()),
-            Item::Configure(node) if number == CONFIGURE => {
-                dictionary.push(Event::Configure(node.map_or(Target::All, Target::Node)))
-            }
-            Item::Configure(_) => Err(AbortCode::CANNOT_STORE),
-            Item::EmcyCount(node) => {
-                if let Some(record) = dictionary.record(node) {
+            Item::ErrorCount => dictionary.errors.clear_field(),
+            Item::EmcyCount => {
+                if let Some(record) = node.and_then(|node| dictionary.record(node)) {
                     record.emcy.clear();
                 }
-                Ok(())
             }
+            Item::Save => return dictionary.store(self.board, (number, SAVE), false),
+            Item::Restore => return dictionary.store(self.board, (number, LOAD), true),
+            Item::NmtRequest => return dictionary.request_nmt(node, number as u8),
+            Item::Configure if number != CONFIGURE => return Err(AbortCode::CANNOT_STORE),
+            Item::Configure if !dictionary.is_master => return Err(AbortCode::DEVICE_STATE),
+            Item::Configure => return dictionary.push(Event::Configure(target)),
             Item::Clock => {
                 let bytes = value.bytes().try_into().map_err(|_| AbortCode::GENERAL)?;
                 let time = TimeOfDay::decode(bytes).ok_or(AbortCode::VALUE_RANGE)?;
                 dictionary.clock.set(time, self.now);
-                Ok(())
             }
-            _ => Err(AbortCode::READ_ONLY),
+            _ => return Err(AbortCode::READ_ONLY),
         }
+        Ok(())
     }
 
     fn read(&mut self, at: Address, offset: u32, buf: &mut [u8]) -> Result<Chunk, AbortCode> {
-        let item = self.dictionary.find(at)?.item;
-        if let Item::Text(text) = item {
-            return Ok(read_bytes(text.as_bytes(), offset, buf));
-        }
-        let mut window = Window::new(offset, buf);
-        if let Item::ConciseDcf(node) = item {
-            let network = self.dictionary.network;
-            let (_, node) = network.find(node).ok_or(AbortCode::NO_DATA)?;
-            concise_dcf(|| network::plan(network, node), &mut window);
-        } else {
-            self.write_words(item, &mut window)?;
-        }
-        Ok(window.chunk())
+        let dictionary = &*self.dictionary;
+        let found = dictionary.find(at)?;
+        let known = found.node().and_then(|id| dictionary.node(id));
+        let description = &dictionary.description;
+        let text = match found.item {
+            Item::DeviceName => description.name,
+            Item::HardwareVersion => description.hardware,
+            Item::SoftwareVersion => description.software,
+            Item::ConciseDcf | Item::BootWords | Item::EmcyWords => {
+                let mut window = Window::new(offset, buf);
+                match (found.item, known) {
+                    (Item::ConciseDcf, Some((node, _))) => {
+                        let network = dictionary.network;
+                        concise_dcf(|| network::plan(network, node), &mut window);
+                    }
+                    (Item::ConciseDcf, None) => return Err(AbortCode::NO_DATA),
+                    (_, None) => window.text("not in the network"),
+                    (Item::BootWords, Some((node, record))) => {
+                        window.text(node.name);
+                        window.text(": ");
+                        record.status.write(&mut window);
+                    }
+                    (_, Some((_, record))) => match record.emcy.get(0) {
+                        Some(emcy) => {
+                            window.hexadecimal(emcy.code.0);
+                            window.text("h (");
+                            window.text(emcy.code.text());
+                            window.text(")");
+                        }
+                        None => window.text("no emergency"),
+                    },
+                }
+                return Ok(window.chunk());
+            }
+            _ => return Err(AbortCode::UNSUPPORTED_ACCESS),
+        };
+        Ok(read_bytes(text.as_bytes(), offset, buf))
     }
 }
 

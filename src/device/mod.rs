@@ -28,28 +28,27 @@
 //! What follows from the design of the network is constant: writing it is
 //! answered with 06010002h. It is computed from [`Network`], not stored.
 
-mod communication;
 mod dictionary;
 mod error;
-mod found;
 mod index;
-mod manager;
 mod node_record;
 mod pdo;
 mod settings;
+mod table;
 mod window;
 
 pub use error::MasterError;
 pub use node_record::NodeStatus;
 pub use settings::{Setting, Settings};
 
-use crate::boot;
+use crate::boot::{self, Startup};
 use crate::emcy::{self, Emcy};
 use crate::frame::{Frame, MAX_DATA};
 use crate::id::NodeId;
 use crate::network::Network;
 use crate::nmt::{NodeControl, Service, State, Target};
 use crate::sdo::{AbortCode, Server};
+use crate::sync::SyncLimits;
 use crate::time::{Duration, Instant};
 use crate::time_of_day::{self, TimeOfDay};
 use dictionary::{Dictionary, View};
@@ -68,8 +67,8 @@ pub struct Description {
     pub software: &'static str,
     /// 1018h
     pub identity: Identity,
-    /// The shortest SYNC period that the device can keep, in microseconds.
-    pub shortest_cycle_us: u32,
+    /// What the device can do of 1006h and 1007h.
+    pub sync: SyncLimits,
 }
 
 /// The identity object, 1018h (CiA 301, 7.5.2.21).
@@ -91,8 +90,12 @@ pub trait Board {
     /// the design's own. Called while no axis is enabled.
     ///
     /// # Errors
-    /// 06060000h if it failed, 08000022h if it is not possible on this board.
+    /// 06060000h if it failed.
     fn save(&mut self, settings: &[u8]) -> Result<(), AbortCode>;
+
+    /// Whether this board can store anything at all: else 1010h and 1011h read as
+    /// 0 and refuse with 08000022h.
+    fn can_save(&self) -> bool;
 
     /// The bytes of a TPDO of a node as it last came, zeros before.
     fn tpdo(&mut self, node: NodeId, number: u8) -> [u8; MAX_DATA];
@@ -140,6 +143,7 @@ impl<const N: usize> Device<N> {
                 description,
                 network,
                 settings: Settings::new(network),
+                is_master: true,
                 errors: emcy::Producer::new(),
                 state: State::Initialising,
                 status: 0,
@@ -157,9 +161,10 @@ impl<const N: usize> Device<N> {
     /// know or accept keeps the design's value.
     pub fn load(&mut self, saved: &[u8], now: Instant) {
         let dictionary = &mut self.dictionary;
-        let shortest = dictionary.description.shortest_cycle_us;
+        let limits = dictionary.description.sync;
         let producing = dictionary.settings.sync().cob_id().is_producer();
-        dictionary.settings = Settings::decode(dictionary.network, saved, shortest);
+        dictionary.settings = Settings::decode(dictionary.network, saved, &limits);
+        dictionary.is_master = dictionary.settings.startup().has(Startup::MASTER);
         dictionary.settings.set_sync_producer(producing);
         self.start_time(now);
     }

@@ -31,7 +31,7 @@ fn description() -> Description {
             serial: nucleo_g474re::serial_number(),
             ..Identity::default()
         },
-        shortest_cycle_us: design::SHORTEST_CYCLE_US,
+        sync: design::SYNC_LIMITS,
     }
 }
 
@@ -60,6 +60,10 @@ where
     fn save(&mut self, _: &[u8]) -> Result<(), AbortCode> {
         // This board keeps nothing over power-off yet.
         Err(AbortCode::DEVICE_STATE)
+    }
+
+    fn can_save(&self) -> bool {
+        false
     }
 
     fn tpdo(&mut self, node: NodeId, number: u8) -> [u8; 8] {

@@ -141,22 +141,29 @@ impl Value {
     /// The low 32 bits of the number, sign extended: what an object of at most
     /// four bytes holds.
     pub const fn as_i32(&self) -> i32 {
-        self.as_i64() as i32
+        self.as_u32() as i32
     }
 
     /// The low 32 bits of the number.
     pub const fn as_u32(&self) -> u32 {
-        self.as_i64() as u32
+        let [a, b, c, d, ..] = self.bytes;
+        let raw = u32::from_le_bytes([a, b, c, d]);
+        if self.signed && self.len > 0 && self.len < 4 {
+            let shift = u32::BITS - 8 * self.len as u32;
+            ((raw << shift) as i32 >> shift) as u32
+        } else {
+            raw
+        }
     }
 
     /// The low 16 bits of the number.
     pub const fn as_u16(&self) -> u16 {
-        self.as_i64() as u16
+        self.as_u32() as u16
     }
 
     /// The low 8 bits of the number.
     pub const fn as_u8(&self) -> u8 {
-        self.as_i64() as u8
+        self.as_u32() as u8
     }
 }
 

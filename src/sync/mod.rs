@@ -3,7 +3,7 @@
 
 mod parameters;
 
-pub use parameters::SyncParameters;
+pub use parameters::{SyncLimits, SyncParameters};
 
 use crate::frame::Frame;
 use crate::id::CobId;

@@ -4,6 +4,26 @@
 use super::{SyncCobId, SyncCounter};
 use crate::sdo::AbortCode;
 
+/// What a device can do, in microseconds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SyncLimits {
+    /// The shortest period that it can keep.
+    pub shortest_period: u32,
+    /// The longest period that its timers can count.
+    pub longest_period: u32,
+    /// The shortest window in which its synchronous PDOs are sent.
+    pub shortest_window: u32,
+}
+
+impl SyncLimits {
+    /// A device that can do anything.
+    pub const NONE: SyncLimits = SyncLimits {
+        shortest_period: 0,
+        longest_period: u32::MAX,
+        shortest_window: 0,
+    };
+}
+
 /// COB-ID, period, window and counter of the SYNC.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -72,18 +92,21 @@ impl SyncParameters {
         Ok(())
     }
 
-    /// Writes 1006h; `shortest` is what the device can do.
+    /// Writes 1006h; 0 stops the SYNC.
     ///
     /// # Errors
-    /// 06090032h for a period that is shorter but not 0; 06040043h for one that
-    /// ends before the window does.
-    pub fn set_period(&mut self, period: u32, shortest: u32) -> Result<(), AbortCode> {
+    /// 06090032h or 06090031h for a period that the device cannot keep; 06040043h
+    /// for one that ends before the window does.
+    pub fn set_period(&mut self, period: u32, limits: &SyncLimits) -> Result<(), AbortCode> {
         if period == 0 {
             self.period = 0;
             return Ok(());
         }
-        if period < shortest {
+        if period < limits.shortest_period {
             return Err(AbortCode::VALUE_TOO_LOW);
+        }
+        if period > limits.longest_period {
+            return Err(AbortCode::VALUE_TOO_HIGH);
         }
         if self.window > period {
             return Err(AbortCode::PARAMETER_INCOMPATIBLE);
@@ -92,11 +115,15 @@ impl SyncParameters {
         Ok(())
     }
 
-    /// Writes 1007h.
+    /// Writes 1007h; 0: no window.
     ///
     /// # Errors
-    /// 06090031h for a window longer than the period.
-    pub fn set_window(&mut self, window: u32) -> Result<(), AbortCode> {
+    /// 06090031h for a window longer than the period, 06090032h for one that ends
+    /// before the device has sent its PDOs.
+    pub fn set_window(&mut self, window: u32, limits: &SyncLimits) -> Result<(), AbortCode> {
+        if window != 0 && window < limits.shortest_window {
+            return Err(AbortCode::VALUE_TOO_LOW);
+        }
         if self.period != 0 && window > self.period {
             return Err(AbortCode::VALUE_TOO_HIGH);
         }

@@ -5,6 +5,7 @@ use canmaster::device::{Board, Description, Device, Event, Identity};
 use canmaster::network::sample::SIX_EPOS4;
 use canmaster::nmt::State;
 use canmaster::sdo::AbortCode;
+use canmaster::sync::SyncLimits;
 use canmaster::time::{Duration, Instant};
 use canmaster::{CobId, Frame, NodeId};
 
@@ -19,7 +20,11 @@ pub(crate) const DESCRIPTION: Description = Description {
         revision: 0x0001_0000,
         serial: 0x1234_5678,
     },
-    shortest_cycle_us: 1000,
+    sync: SyncLimits {
+        shortest_period: 1000,
+        longest_period: 65_535,
+        shortest_window: 300,
+    },
 };
 
 pub(crate) fn node(id: u8) -> NodeId {
@@ -35,6 +40,7 @@ pub(crate) fn ms(ms: u64) -> Instant {
 pub(crate) struct Fake {
     pub(crate) saved: Option<Vec<u8>>,
     pub(crate) refuses: Option<AbortCode>,
+    pub(crate) can_save: bool,
 }
 
 impl Board for Fake {
@@ -46,6 +52,10 @@ impl Board for Fake {
                 Ok(())
             }
         }
+    }
+
+    fn can_save(&self) -> bool {
+        self.can_save
     }
 
     fn tpdo(&mut self, node: NodeId, number: u8) -> [u8; 8] {
@@ -69,7 +79,10 @@ impl Bench {
         let timeout = Duration::from_millis(500);
         let mut bench = Bench {
             device: Device::new(DESCRIPTION, &SIX_EPOS4, timeout),
-            board: Fake::default(),
+            board: Fake {
+                can_save: true,
+                ..Fake::default()
+            },
             now: ms(0),
         };
         bench.enter(State::PreOperational);

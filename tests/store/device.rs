@@ -7,6 +7,7 @@ use canmaster::network::sample::SIX_EPOS4;
 use canmaster::nmt::State;
 use canmaster::sdo::AbortCode;
 use canmaster::store::{CAPACITY, Store};
+use canmaster::sync::SyncLimits;
 use canmaster::{CobId, Duration, Frame, Instant, NodeId};
 
 const DESCRIPTION: Description = Description {
@@ -20,7 +21,11 @@ const DESCRIPTION: Description = Description {
         revision: 0,
         serial: 0,
     },
-    shortest_cycle_us: 1000,
+    sync: SyncLimits {
+        shortest_period: 1000,
+        longest_period: 65_535,
+        shortest_window: 300,
+    },
 };
 
 struct WithFlash(Store<Flash>);
@@ -28,6 +33,10 @@ struct WithFlash(Store<Flash>);
 impl Board for WithFlash {
     fn save(&mut self, settings: &[u8]) -> Result<(), AbortCode> {
         Ok(self.0.save(settings)?)
+    }
+
+    fn can_save(&self) -> bool {
+        true
     }
 
     fn tpdo(&mut self, _: NodeId, _: u8) -> [u8; 8] {

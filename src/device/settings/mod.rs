@@ -11,7 +11,7 @@ use crate::id::NodeId;
 use crate::network::Network;
 use crate::nmt::ErrorBehaviour;
 use crate::sdo::AbortCode;
-use crate::sync::{SyncCobId, SyncParameters};
+use crate::sync::{SyncCobId, SyncLimits, SyncParameters};
 use crate::time::Duration;
 use crate::time_of_day::TimeCobId;
 
@@ -201,10 +201,10 @@ impl<const N: usize> Settings<N> {
         &mut self,
         setting: Setting,
         value: u32,
-        shortest_cycle_us: u32,
+        limits: &SyncLimits,
     ) -> Result<(), AbortCode> {
         let before = self.get(setting);
-        self.put(setting, value, shortest_cycle_us)?;
+        self.put(setting, value, limits)?;
         let is_signature = matches!(
             setting,
             Setting::ConfigurationDate | Setting::ConfigurationTime
@@ -215,11 +215,11 @@ impl<const N: usize> Settings<N> {
         Ok(())
     }
 
-    fn put(&mut self, setting: Setting, value: u32, shortest: u32) -> Result<(), AbortCode> {
+    fn put(&mut self, setting: Setting, value: u32, limits: &SyncLimits) -> Result<(), AbortCode> {
         match setting {
             Setting::SyncCobId => return self.sync.set_cob_id(SyncCobId(value)),
-            Setting::SyncPeriod => return self.sync.set_period(value, shortest),
-            Setting::SyncWindow => return self.sync.set_window(value),
+            Setting::SyncPeriod => return self.sync.set_period(value, limits),
+            Setting::SyncWindow => return self.sync.set_window(value, limits),
             Setting::SyncOverflow => {
                 let overflow = u8::try_from(value).map_err(|_| AbortCode::VALUE_RANGE)?;
                 return self.sync.set_overflow(overflow);

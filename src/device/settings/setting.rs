@@ -1,6 +1,6 @@
 //! The entries that can be written and saved.
 
-use super::super::index;
+use super::super::table::{Item, Row, TABLE};
 use crate::id::Address;
 use crate::network::Network;
 use crate::od::DataType;
@@ -44,16 +44,28 @@ pub enum Setting {
     TimePeriod,
 }
 
+/// The settings of the board alone, in an order in which they can be loaded: the
+/// SYNC's period after what may be changed only without one.
+const OWN: [Setting; 13] = [
+    Setting::SyncOverflow,
+    Setting::SyncWindow,
+    Setting::SyncPeriod,
+    Setting::TimeCobId,
+    Setting::TimePeriod,
+    Setting::EmcyCobId,
+    Setting::EmcyInhibit,
+    Setting::ProducerHeartbeat,
+    Setting::ErrorBehaviour,
+    Setting::Startup,
+    Setting::BootTime,
+    Setting::ConfigurationDate,
+    Setting::ConfigurationTime,
+];
+
 impl Setting {
     /// Type of the entry.
-    pub const fn data_type(self) -> DataType {
-        match self {
-            Setting::SyncOverflow | Setting::ErrorBehaviour => DataType::Unsigned8,
-            Setting::EmcyInhibit | Setting::ProducerHeartbeat | Setting::TimePeriod => {
-                DataType::Unsigned16
-            }
-            _ => DataType::Unsigned32,
-        }
+    pub fn data_type(self) -> DataType {
+        self.row().map_or(DataType::Unsigned32, |row| row.data_type)
     }
 
     /// Whether it can be written in pre-operational only: the SYNC is the beat
@@ -67,51 +79,40 @@ impl Setting {
 
     /// The entry; `None` if the network has no such node.
     pub fn address(self, network: &Network) -> Option<Address> {
-        let (at, sub) = match self {
-            Setting::SyncCobId => (index::COB_ID_SYNC, 0),
-            Setting::SyncPeriod => (index::SYNC_PERIOD, 0),
-            Setting::SyncWindow => (index::SYNC_WINDOW, 0),
-            Setting::TimeCobId => (index::COB_ID_TIME, 0),
-            Setting::EmcyCobId => (index::COB_ID_EMCY, 0),
-            Setting::EmcyInhibit => (index::EMCY_INHIBIT, 0),
-            Setting::ConsumerHeartbeat(n) => (index::CONSUMER_HEARTBEAT, n + 1),
-            Setting::ProducerHeartbeat => (index::PRODUCER_HEARTBEAT, 0),
-            Setting::SyncOverflow => (index::SYNC_OVERFLOW, 0),
-            Setting::ConfigurationDate => (index::VERIFY_CONFIGURATION, 1),
-            Setting::ConfigurationTime => (index::VERIFY_CONFIGURATION, 2),
-            Setting::ErrorBehaviour => (index::ERROR_BEHAVIOUR, 1),
-            Setting::Startup => (index::NMT_STARTUP, 0),
-            Setting::Assignment(n) => {
-                let node = network.nodes.get(usize::from(n))?;
-                (index::SLAVE_ASSIGNMENT, node.id.get())
-            }
-            Setting::BootTime => (index::BOOT_TIME, 0),
-            Setting::TimePeriod => (index::TIME_PERIOD, 0),
+        let row = self.row()?;
+        let sub = match self {
+            Setting::ConsumerHeartbeat(n) => n + 1,
+            Setting::Assignment(n) => network.nodes.get(usize::from(n))?.id.get(),
+            _ => row.sub,
         };
-        Some(Address::new(at, sub))
+        Some(Address::new(row.first, sub))
     }
 
-    /// Those that are saved, in an order in which they can be loaded: the SYNC's
-    /// period after what may be changed only without one.
+    /// Its line in the list of objects: of the settings of a node, that names the
+    /// first.
+    fn row(self) -> Option<&'static Row> {
+        let named = match self {
+            Setting::ConsumerHeartbeat(_) => Setting::ConsumerHeartbeat(0),
+            Setting::Assignment(_) => Setting::Assignment(0),
+            own => own,
+        };
+        TABLE.iter().find(|row| row.item == Item::Setting(named))
+    }
+
+    /// Those that are saved, in an order in which they can be loaded.
     pub fn saved(nodes: u8) -> impl Iterator<Item = Setting> {
-        let fixed = [
-            Setting::SyncOverflow,
-            Setting::SyncWindow,
-            Setting::SyncPeriod,
-            Setting::TimeCobId,
-            Setting::TimePeriod,
-            Setting::EmcyCobId,
-            Setting::EmcyInhibit,
-            Setting::ProducerHeartbeat,
-            Setting::ErrorBehaviour,
-            Setting::Startup,
-            Setting::BootTime,
-            Setting::ConfigurationDate,
-            Setting::ConfigurationTime,
-        ];
-        fixed
-            .into_iter()
-            .chain((0..nodes).map(Setting::ConsumerHeartbeat))
-            .chain((0..nodes).map(Setting::Assignment))
+        (0..).map_while(move |n| Setting::nth_saved(n, nodes))
+    }
+
+    fn nth_saved(n: u8, nodes: u8) -> Option<Setting> {
+        let Some(n) = usize::from(n).checked_sub(OWN.len()) else {
+            return OWN.get(usize::from(n)).copied();
+        };
+        let n = n as u8;
+        if n < nodes {
+            return Some(Setting::ConsumerHeartbeat(n));
+        }
+        let n = n - nodes;
+        (n < nodes).then_some(Setting::Assignment(n))
     }
 }

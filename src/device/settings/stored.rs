@@ -6,7 +6,7 @@ use crate::id::Address;
 use crate::network::Network;
 use crate::od::Value;
 use crate::sdo::AbortCode;
-use crate::sync::SyncParameters;
+use crate::sync::{SyncLimits, SyncParameters};
 
 impl<const N: usize> Settings<N> {
     /// Writes every setting that is saved into `buf`; returns the bytes used.
@@ -37,7 +37,11 @@ impl<const N: usize> Settings<N> {
 
     /// The design's settings with those from `saved` over them. What is not
     /// known or not accepted any more is left out.
-    pub(in crate::device) fn decode(network: &Network, saved: &[u8], shortest: u32) -> Settings<N> {
+    pub(in crate::device) fn decode(
+        network: &Network,
+        saved: &[u8],
+        limits: &SyncLimits,
+    ) -> Settings<N> {
         let mut settings = Settings::new(network);
         if saved.is_empty() {
             return settings;
@@ -60,10 +64,10 @@ impl<const N: usize> Settings<N> {
             let Ok(value) = Value::from_bytes(setting.data_type(), data) else {
                 continue;
             };
-            let taken = settings.put(setting, value.as_u32(), shortest).is_ok();
+            let taken = settings.put(setting, value.as_u32(), limits).is_ok();
             has_period |= taken && setting == Setting::SyncPeriod;
         }
-        if !has_period && settings.sync.set_period(period, 0).is_err() {
+        if !has_period && settings.sync.set_period(period, &SyncLimits::NONE).is_err() {
             // Only a window that is too long can have refused it.
             settings.sync = SyncParameters::new(period);
         }

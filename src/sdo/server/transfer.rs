@@ -2,7 +2,7 @@
 //! object dictionary and what is read from it, whatever the protocol between.
 
 use crate::id::Address;
-use crate::od::{Chunk, Entry, ObjectDictionary, Part, VALUE_MAX, Value};
+use crate::od::{Chunk, DataType, ObjectDictionary, Part, VALUE_MAX, Value};
 use crate::sdo::AbortCode;
 
 /// The receiving end of a download.
@@ -12,7 +12,7 @@ use crate::sdo::AbortCode;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sink {
     pub(super) at: Address,
-    entry: Entry,
+    data_type: DataType,
     /// What the client said it would send.
     size: Option<u32>,
     received: u32,
@@ -33,7 +33,7 @@ impl Sink {
         }
         Ok(Sink {
             at,
-            entry,
+            data_type: entry.data_type,
             size,
             received: 0,
             value: [0; VALUE_MAX],
@@ -42,7 +42,7 @@ impl Sink {
 
     /// How many bytes the type takes; `None` for strings and domains.
     pub(super) const fn fixed_size(&self) -> Option<usize> {
-        self.entry.data_type.size()
+        self.data_type.size()
     }
 
     /// Takes the next bytes.
@@ -91,8 +91,8 @@ impl Sink {
         space.copy_from_slice(data);
         if last {
             let whole = self.value.get(..to).unwrap_or(&[]);
-            let value = Value::from_bytes(self.entry.data_type, whole)?;
-            self.entry.in_range(value)?;
+            let value = Value::from_bytes(self.data_type, whole)?;
+            od.entry(self.at)?.in_range(value)?;
             od.set(self.at, value)?;
         }
         Ok(())
