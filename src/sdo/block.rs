@@ -9,6 +9,9 @@ use super::crc::Crc16;
 /// After so many acknowledgements in a row of nothing at all the sender gives
 /// up: a transfer that makes no progress must end.
 const FRUITLESS_MAX: u8 = 3;
+/// After so many segments in a row that are out of sequence the receiver gives
+/// up, for the same reason: it is what the sender's limit lets through.
+const STRAY_MAX: u16 = (FRUITLESS_MAX as u16 + 1) * BLOCK_MAX as u16;
 
 /// # Errors
 /// 05040002h unless a block has 1..=127 segments.
@@ -152,6 +155,8 @@ pub(super) struct Receiver {
     use_crc: bool,
     crc: Crc16,
     stalled: bool,
+    /// Segments out of sequence since the last one in sequence.
+    stray: u16,
 }
 
 impl Receiver {
@@ -164,6 +169,7 @@ impl Receiver {
             use_crc,
             crc: Crc16::new(),
             stalled: false,
+            stray: 0,
         }
     }
 
@@ -180,6 +186,9 @@ impl Receiver {
     /// Takes in a segment; hands the one before it to `deliver`. Returns the
     /// sequence number to acknowledge where the block is over. A segment out
     /// of sequence is discarded with all that follow it in the block.
+    ///
+    /// # Errors
+    /// What `deliver` says; 05040003h if nothing but such segments comes.
     pub(super) fn segment(
         &mut self,
         segment: BlockSegment,
@@ -194,6 +203,11 @@ impl Receiver {
             self.held = Some(segment.data);
             self.sequence = segment.sequence;
             self.complete = segment.last;
+            self.stray = 0;
+        } else if self.stray < STRAY_MAX {
+            self.stray += 1;
+        } else {
+            return Err(AbortCode::SEQUENCE_NUMBER);
         }
         let over = segment.last || segment.sequence >= self.block_size;
         Ok(over.then(|| self.acknowledge()))

@@ -1,8 +1,13 @@
 //! Tests of the SDO services.
 
 mod block;
+mod broken;
 mod client;
+mod client_matrix;
 mod commands;
 mod common;
+mod late;
 mod lossy;
 mod server;
+mod server_matrix;
+mod wire;

@@ -12,9 +12,17 @@
 //! After a timeout or a violation of the protocol the channel stays closed for
 //! a quarantine, by default as long as the timeout, and discards what arrives:
 //! a node that is merely slow would otherwise answer the old request to the
-//! new one. One confusion remains possible: the answer to a request for the
-//! same entry that arrives later than timeout and quarantine together is taken
-//! for the answer to a newer request for that entry.
+//! new one.
+//!
+//! What remains possible, because the protocol has nothing to tell it by: an
+//! answer that arrives later than timeout and quarantine together is taken for
+//! the answer to a newer request, if that is for the same entry by the same
+//! command. Segments, and the acknowledgements of segments, name no entry at
+//! all: one that is so late can join a newer transfer of another entry where its
+//! toggle bit, or its sequence number, happens to be the one awaited. The size
+//! that was announced, and the checksum of a block transfer, then end the
+//! transfer in most cases. The remedy is a timeout longer than the node ever
+//! takes, or a longer quarantine ([`Channel::with_quarantine`]).
 
 mod block;
 mod segmented;

@@ -108,6 +108,9 @@ impl Channel {
         if segment.toggle != toggle {
             return Step::Violation(AbortCode::TOGGLE);
         }
+        if segment.is_fruitless() {
+            return Step::Violation(AbortCode::COMMAND);
+        }
         if let Err(step) = self.take(segment.data(), segment.last, payload) {
             return step;
         }

@@ -144,6 +144,11 @@ impl Segment {
         self.data.get(..usize::from(self.len)).unwrap_or(&[])
     }
 
+    /// Neither data nor the end: a transfer of such segments would never end.
+    pub(super) const fn is_fruitless(&self) -> bool {
+        self.len == 0 && !self.last
+    }
+
     fn parse(bytes: Bytes) -> Segment {
         let [command, data @ ..] = bytes;
         let len = SEGMENT_MAX as u8 - ((command >> 1) & 0x07);

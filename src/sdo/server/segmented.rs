@@ -52,6 +52,9 @@ impl Server {
         if segment.toggle != *toggle {
             return Err(AbortCode::TOGGLE);
         }
+        if segment.is_fruitless() {
+            return Err(AbortCode::COMMAND);
+        }
         sink.push(od, segment.data(), segment.last)?;
         *toggle = !*toggle;
         if segment.last {

@@ -125,6 +125,8 @@ fn check_length(told: u32, needed: usize) -> Result<(), AbortCode> {
 pub(super) struct Source {
     pub(super) at: Address,
     value: Option<Value>,
+    /// Of a string or domain when the transfer began, as the client was told.
+    size: Option<u32>,
 }
 
 impl Source {
@@ -132,14 +134,18 @@ impl Source {
     pub(super) fn open(od: &mut impl ObjectDictionary, at: Address) -> Result<Source, AbortCode> {
         let entry = od.entry(at)?;
         entry.readable()?;
-        let value = match entry.data_type.size() {
-            Some(_) => Some(od.get(at)?),
-            None => None,
+        let (value, size) = match entry.data_type.size() {
+            Some(_) => (Some(od.get(at)?), None),
+            None => (None, od.read(at, 0, &mut [])?.size),
         };
-        Ok(Source { at, value })
+        Ok(Source { at, value, size })
     }
 
     /// Copies from `offset` on into `buf`.
+    ///
+    /// # Errors
+    /// 08000022h if a string or domain has another size than when the transfer
+    /// began: the client was told that one.
     pub(super) fn read(
         &self,
         od: &mut impl ObjectDictionary,
@@ -153,6 +159,9 @@ impl Source {
                 // A length past the buffer would be a fault of the dictionary.
                 if chunk.len > buf.len() {
                     return Err(AbortCode::GENERAL);
+                }
+                if chunk.size != self.size {
+                    return Err(AbortCode::DEVICE_STATE);
                 }
                 Ok(chunk)
             }
