@@ -41,7 +41,7 @@ impl Clock {
         if let Some((time, at)) = &mut self.set
             && now.as_micros().saturating_sub(at.as_micros()) >= u64::from(US_PER_HOUR)
         {
-            *at = *at + Duration::from_micros(US_PER_HOUR);
+            *at += Duration::from_micros(US_PER_HOUR);
             *time = time.after_ms(MS_PER_HOUR);
         }
     }
