@@ -2,6 +2,7 @@
 //! the nodes answer. The nodes here are tables of bytes, not the library's own
 //! server.
 
+mod anything;
 mod bus_off;
 mod configuration;
 mod factory;

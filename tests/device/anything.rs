@@ -39,6 +39,69 @@ fn only_requests_are_answered() {
     }
 }
 
+/// Entries of every type and access, and some that do not exist.
+const ENTRIES: [(u16, u8); 26] = [
+    (0x1000, 0),
+    (0x1003, 0),
+    (0x1003, 1),
+    (0x1005, 0),
+    (0x1006, 0),
+    (0x1008, 0),
+    (0x1010, 1),
+    (0x1011, 1),
+    (0x1014, 0),
+    (0x1016, 6),
+    (0x1017, 0),
+    (0x1018, 4),
+    (0x1019, 0),
+    (0x1019, 1),
+    (0x1029, 1),
+    (0x1280, 3),
+    (0x1400, 2),
+    (0x1A00, 1),
+    (0x1F22, 1),
+    (0x1F25, 1),
+    (0x1F80, 0),
+    (0x1F81, 1),
+    (0x1F82, 0x80),
+    (0x2F10, 0),
+    (0x3001, 1),
+    (0x6040, 0),
+];
+
+/// Nothing but an abort goes unanswered where SDO is allowed, and nothing is
+/// answered where it is not.
+#[test]
+fn every_command_to_an_entry_of_every_kind_in_every_state() {
+    let tails = [
+        [0; 4],
+        [2, 0, 0, 0],
+        [127, 0, 0, 0],
+        [5, 0, 0, 0],
+        [0xFF; 4],
+    ];
+    for state in STATES {
+        for (index, sub) in ENTRIES {
+            let [low, high] = index.to_le_bytes();
+            let mut b = Bench::new();
+            b.enter(state);
+            for command in 0..=u8::MAX {
+                for [t0, t1, t2, t3] in tails {
+                    let bytes = [command, low, high, sub, t0, t1, t2, t3];
+                    let answer = b.ask(bytes);
+                    let expected = allows_sdo(state) && command >> 5 != 4;
+                    assert_eq!(answer.is_some(), expected, "{state}: {bytes:02X?}");
+                    // The next one begins anew.
+                    assert_eq!(b.ask([0x80, low, high, sub, 0, 0, 0, 0]), None);
+                    b.events();
+                }
+            }
+            b.enter(State::PreOperational);
+            assert_eq!(b.number(0x1200, 1), Ok(0x67F));
+        }
+    }
+}
+
 #[derive(Clone, Debug)]
 enum Do {
     Frame(u16, [u8; 8], usize, bool),

@@ -1,5 +1,6 @@
 //! Tests of NMT, EMCY, SYNC, the LSS, the indicators and PDOs.
 
+mod anything;
 mod emcy;
 mod guarding;
 mod led;
