@@ -3,9 +3,9 @@
 //!
 //! [`NetworkBoot`] runs the network and, for each node, the steps of CiA 302-2,
 //! "Boot slave", each step a state. A frame or the time goes in, [`Action`]s
-//! come out. [`Settings`] are 1F80h, 1F81h, 1F89h, 1F8Ah, 1F26h and 1F27h; what
-//! each node has to be (1F84h .. 1F88h) and what is written to it (1F22h) comes
-//! from the description of the network.
+//! come out. [`Settings`] are 1F80h, 1F81h, 1F89h and 1F8Ah; what each node has to
+//! be (1F84h .. 1F88h), what is written to it (1F22h) and when it need not be
+//! (1F26h, 1F27h) comes from the description of the network.
 //!
 //! Where the standard leaves room, or motion wants more than it asks for:
 //! - Nodes are started only when every mandatory one is booted, one by one too.

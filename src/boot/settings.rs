@@ -110,13 +110,11 @@ pub struct NodeSettings {
     /// 1F8Ah: the sub-index of 1011h that restores the node's parameters, if
     /// [`Assignment::RESTORE`] is set; 0: none.
     pub restore: u8,
-    /// 1F26h and 1F27h: what 1020h:1 and 1020h:2 say if the node is configured
-    /// already. 0 and 0: it is configured every time.
-    pub configured: [u32; 2],
 }
 
 /// The settings of a master of at most `N` nodes; what each node has to be
-/// (1F84h .. 1F88h) and what is written to it (1F22h) is in [`Network`].
+/// (1F84h .. 1F88h), what is written to it (1F22h) and when that need not be done
+/// (1F26h, 1F27h) is in [`Network`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings<const N: usize> {
     /// 1F80h.
@@ -137,7 +135,6 @@ impl<const N: usize> Settings<N> {
             nodes: [NodeSettings {
                 assignment: Assignment(Assignment::LISTED | Assignment::MAY_START),
                 restore: 0,
-                configured: [0; 2],
             }; N],
         };
         for (settings, node) in settings.nodes.iter_mut().zip(network.nodes) {

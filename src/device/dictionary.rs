@@ -325,6 +325,10 @@ impl<B: Board, const N: usize> View<'_, B, N> {
                 });
                 expected.unwrap_or(0)
             }
+            Item::ConfiguredAt => known
+                .and_then(|(node, _)| node.configured.get(usize::from(found.place)))
+                .copied()
+                .unwrap_or(0),
             Item::RestoreConfiguration => known.map_or(0, |_| RESTORE_ALL).into(),
             Item::BootLetter => record.map_or(0, |record| record.status.letter()).into(),
             Item::EmcyCount => record.map_or(0, |record| record.emcy.len() as u32),

@@ -44,6 +44,8 @@ pub(super) enum Item {
     NmtRequest,
     /// 1F84h ..= 1F88h
     Expected,
+    /// 1F26h and 1F27h
+    ConfiguredAt,
     RestoreConfiguration,
     BootLetter,
     BootWords,
@@ -280,8 +282,13 @@ pub(super) static TABLE: [Row; 51] = {
             WriteOnly,
             Item::Configure,
         ),
-        // The network names no date: its nodes are configured at every start.
-        node(index::EXPECTED_DATE, Unsigned32, Constant, Item::Zero).up_to(index::EXPECTED_TIME),
+        node(
+            index::EXPECTED_DATE,
+            Unsigned32,
+            Constant,
+            Item::ConfiguredAt,
+        )
+        .up_to(index::EXPECTED_TIME),
         Row::setting(index::NMT_STARTUP, Unsigned32, Setting::Startup),
         node(
             index::SLAVE_ASSIGNMENT,

@@ -42,8 +42,6 @@ pub struct Master {
     /// Boot time (1F89h): a mandatory node unseen this long after the reset
     /// command ends the start.
     pub boot_time: Duration,
-    /// How long an SDO server may take to answer.
-    pub sdo_timeout: Duration,
     /// How often an SDO request is tried before the node is given up.
     pub sdo_tries: u8,
     /// SYNCs sent before NMT start, so that every node has seen the period.
@@ -72,6 +70,12 @@ pub struct Node {
     pub tpdos: &'static [Pdo],
     /// Further objects and their start values, written in this order.
     pub start_values: &'static [ConfigWrite],
+    /// How long its SDO server may take to answer.
+    pub sdo_timeout: Duration,
+    /// 1F26h and 1F27h: date and time in 1020h:1 and 1020h:2 of the node when
+    /// it is configured already. 0 and 0: it is configured at every boot-up, as
+    /// a node without 1020h has to be.
+    pub configured: [u32; 2],
 }
 
 /// Expected identity (1F84h .. 1F88h, CiA 302-2). `None` is not checked.

@@ -106,6 +106,9 @@ const fn epos4(id: NodeId, name: &'static str) -> Node {
         rpdos: RPDOS,
         tpdos: TPDOS,
         start_values: START_VALUES,
+        sdo_timeout: Duration::from_millis(100),
+        // An EPOS4 has no 1020h.
+        configured: [0; 2],
     }
 }
 
@@ -119,7 +122,6 @@ pub static SIX_EPOS4: Network = Network {
         heartbeat: Duration::from_millis(50),
         silence: Duration::from_millis(600),
         boot_time: Duration::from_millis(1500),
-        sdo_timeout: Duration::from_millis(100),
         sdo_tries: 3,
         syncs_before_start: 2,
     },

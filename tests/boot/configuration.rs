@@ -2,18 +2,19 @@
 
 use crate::networks::{assign, network};
 use crate::rig::{Rig, ms};
-use canmaster::boot::{Assignment, Event, Settings};
+use canmaster::boot::{Assignment, Event};
+use canmaster::network::Network;
 
 const DATE: u32 = 15_000;
 const TIME: u32 = 43_200_000;
 
-fn dated(settings: &mut Settings<6>) {
-    settings.nodes[1].configured = [DATE, TIME];
+fn dated() -> &'static Network {
+    network(2, |node| node.configured = [DATE, TIME])
 }
 
 #[test]
 fn a_node_with_the_expected_configuration_is_not_written_to() {
-    let mut rig = Rig::with(network(2, |_| {}), dated);
+    let mut rig = Rig::with(dated(), |_| {});
     rig.fakes[1].set((0x1020, 1), DATE);
     rig.fakes[1].set((0x1020, 2), TIME);
     rig.run_for(ms(700));
@@ -40,7 +41,7 @@ fn another_configuration_is_written_with_its_date_and_time_last() {
         (DATE, TIME + 1, None),
         (DATE, TIME, Some(((0x1020, 1), 0x0602_0000))),
     ] {
-        let mut rig = Rig::with(network(2, |_| {}), dated);
+        let mut rig = Rig::with(dated(), |_| {});
         rig.fakes[1].set((0x1020, 1), date);
         rig.fakes[1].set((0x1020, 2), time);
         rig.fakes[1].refuses = refuses;
@@ -92,4 +93,24 @@ fn a_node_that_cannot_be_restored_is_given_up() {
     rig.run_for(ms(2500));
     rig.assert_nothing_was_started();
     assert_eq!(rig.letter(2), Some('J'));
+}
+
+#[test]
+fn each_node_has_its_own_sdo_timeout() {
+    let slow = network(2, |node| node.sdo_timeout = ms(300));
+    let mut rig = Rig::new(slow);
+    for fake in &mut rig.fakes {
+        fake.mute = Some((0x1018, 2));
+    }
+    rig.run_for(ms(4000));
+    for (node, timeout) in [(1, ms(100)), (2, ms(300))] {
+        let times = |command| {
+            let to_node = rig.sent.iter().filter(move |(_, frame)| {
+                frame.id().get() == 0x600 + node && frame.data()[..4] == [command, 0x18, 0x10, 0x02]
+            });
+            to_node.map(|(at, _)| *at).next()
+        };
+        let (asked, aborted) = (times(0x40).unwrap(), times(0x80).unwrap());
+        assert_eq!(aborted, asked + timeout, "node {node}");
+    }
 }

@@ -25,6 +25,8 @@ pub(crate) fn network(n: u8, change: impl Fn(&mut Node)) -> &'static Network {
             rpdos: &[],
             tpdos: &[],
             start_values: &[START_VALUE],
+            sdo_timeout: ms(100),
+            configured: [0; 2],
         };
         if number == 2 {
             change(&mut node);
@@ -39,7 +41,6 @@ pub(crate) fn network(n: u8, change: impl Fn(&mut Node)) -> &'static Network {
             heartbeat: ms(50),
             silence: ms(600),
             boot_time: ms(1500),
-            sdo_timeout: ms(100),
             sdo_tries: 3,
             syncs_before_start: 2,
         },

@@ -62,7 +62,7 @@ impl NodeBoot {
             network,
             node,
             settings,
-            client: Client::new(node.id, network.master.sdo_timeout),
+            client: Client::new(node.id, node.sdo_timeout),
             state: State::Idle(Idle),
             boot_deadline: None,
             guard: Instant::ZERO,

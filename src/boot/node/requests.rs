@@ -110,7 +110,7 @@ impl NodeBoot {
             Some(item) => {
                 let item = usize::from(item);
                 let at = SIGNATURE.get(item)?;
-                let value = self.settings.configured.get(item)?;
+                let value = self.node.configured.get(item)?;
                 Some(ConfigWrite::u32(*at, *value))
             }
         }
@@ -118,7 +118,7 @@ impl NodeBoot {
 
     /// How many entries of 1020h are compared and written.
     fn signature_len(&self) -> u16 {
-        match self.settings.configured {
+        match self.node.configured {
             [0, 0] => 0,
             _ => SIGNATURE.len() as u16,
         }
@@ -188,7 +188,7 @@ impl NodeBoot {
                 }
             }
             State::Verify(Verify { item }) => {
-                if found.ok().as_ref() == self.settings.configured.get(item) {
+                if found.ok().as_ref() == self.node.configured.get(item) {
                     self.state = State::Verify(Verify { item: item + 1 });
                 } else {
                     self.begin_configuration();

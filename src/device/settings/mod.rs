@@ -153,8 +153,8 @@ impl<const N: usize> Settings<N> {
         Duration::from_millis(self.boot_time_ms)
     }
 
-    /// What the boot-up of the network goes by: 1F80h, 1F81h, 1F89h; 1F26h, 1F27h
-    /// and 1F8Ah as they are in this dictionary.
+    /// What the boot-up of the network goes by: 1F80h, 1F81h, 1F89h; 1F8Ah as it
+    /// is in this dictionary.
     pub fn boot(&self) -> boot::Settings<N> {
         boot::Settings {
             startup: self.startup,
@@ -162,7 +162,6 @@ impl<const N: usize> Settings<N> {
             nodes: self.assignments.map(|assignment| boot::NodeSettings {
                 assignment,
                 restore: RESTORE_ALL,
-                configured: [0; 2],
             }),
         }
     }
