@@ -1,117 +1,72 @@
 //! The board as a CANopen device: a client on the same bus reads and writes its
-//! object dictionary while the master runs the network.
+//! object dictionary while the master runs the network, and commands it.
 
 mod common;
 
 use canmaster::id::Address;
-use canmaster::sdo::{Channel, Payload, Progress, Protocol, SdoError, Transfer};
-use canmaster::time::{Duration, Instant};
-use canmaster::{Frame, NodeId};
-use canmaster_sim::frame::WireFrame;
+use canmaster::nmt::{Command, NodeControl};
+use canmaster::sdo::{AbortCode, Protocol, SdoError};
+use canmaster::{CobId, Frame, NodeId};
+use canmaster_sim::drive::DriveFault;
 use canmaster_sim::time::Time;
-use canmaster_sim::world::{Scenario, World, enabled};
+use canmaster_sim::world::{Client, Scenario, Stimulus, World, enabled};
 
 use common::image;
 
 const MASTER: NodeId = NodeId::constant::<127>();
 const END: Time = Time::from_ms(20_000);
-const PATIENCE: Time = Time::from_ms(2000);
+/// The silent phase is over and the board is in pre-operational.
+const AWAKE: Time = Time::from_ms(700);
+const HEARTBEAT: u16 = 0x77F;
+const EMCY: u16 = 0x0FF;
+const STOPPED: u8 = 0x04;
 
-/// What is written, or was read.
-#[derive(Default)]
-struct Data(Vec<u8>);
-
-impl Payload for Data {
-    fn read(&mut self, offset: u32, buf: &mut [u8]) {
-        let from = offset as usize;
-        buf.copy_from_slice(&self.0[from..from + buf.len()]);
-    }
-
-    fn begin(&mut self, _: Option<u32>) -> Result<(), canmaster::sdo::AbortCode> {
-        self.0.clear();
-        Ok(())
-    }
-
-    fn write(&mut self, offset: u32, data: &[u8]) -> Result<(), canmaster::sdo::AbortCode> {
-        self.0.truncate(offset as usize);
-        self.0.extend_from_slice(data);
-        Ok(())
-    }
-}
-
-/// A client with a machine around it.
-struct Client<'i> {
-    world: World<'i>,
-    channel: Channel,
-}
-
-impl Client<'_> {
-    fn now(&self) -> Instant {
-        Instant::from_micros(self.world.now().0 / 1_000_000)
-    }
-
-    fn say(&mut self, frame: Frame) {
-        assert!(self.world.say(WireFrame::from(frame)));
-    }
-
-    fn finish(&mut self, first: Frame, data: &mut Data) -> Result<Transfer, SdoError> {
-        self.say(first);
-        let limit = self.world.now() + PATIENCE;
-        while self.world.now() < limit {
-            let next = self.world.now() + Time::from_us(200);
-            self.world.run_until(next);
-            loop {
-                let now = self.now();
-                let progress = match self.world.hear() {
-                    Some(frame) => match Frame::try_from(frame) {
-                        Ok(frame) => self.channel.on_frame(&frame, now, data),
-                        Err(_) => continue,
-                    },
-                    None => match self.channel.poll(now, data) {
-                        Progress::Nothing => break,
-                        progress => progress,
-                    },
-                };
-                match progress {
-                    Progress::Nothing => {}
-                    Progress::Send(frame) => self.say(frame),
-                    Progress::Done(transfer) => return Ok(transfer),
-                    Progress::Failed(error, _) => return Err(error),
-                }
-            }
-        }
-        panic!("the server neither answered nor was given up");
-    }
-
-    fn read(&mut self, at: Address, protocol: Protocol) -> Result<Vec<u8>, SdoError> {
-        let mut data = Data::default();
-        let first = self.channel.upload(at, protocol, self.now()).unwrap();
-        self.finish(first, &mut data)?;
-        Ok(data.0)
-    }
-
-    fn write(&mut self, at: Address, bytes: &[u8], protocol: Protocol) -> Result<(), SdoError> {
-        let mut data = Data(bytes.to_vec());
-        let (size, now) = (bytes.len() as u32, self.now());
-        let first = self.channel.download(at, size, protocol, &mut data, now);
-        self.finish(first.unwrap(), &mut data).map(|_| ())
-    }
+fn client(scenario: Scenario) -> Client<'static> {
+    let world = World::new(image(), scenario.unattended()).unwrap();
+    Client::new(world, MASTER)
 }
 
 /// A client beside a master in standby.
 fn in_standby(seed: u64) -> Client<'static> {
-    let scenario = Scenario::new(seed, END).unattended();
-    let mut world = World::new(image(), scenario).unwrap().with_guest();
-    let standby = |world: &World<'_>| world.statuses().flatten().all(|status| enabled(&status));
-    assert!(world.run_to(Time::from_ms(4000), standby));
-    Client {
-        world,
-        channel: Channel::new(MASTER, Duration::from_millis(300)),
-    }
+    let mut client = client(Scenario::new(seed, END));
+    assert!(client.world.run_to(Time::from_ms(4000), all_enabled));
+    client.take_heard();
+    client
+}
+
+/// A client beside a master without drives, in pre-operational.
+fn alone(seed: u64) -> Client<'static> {
+    let mut client = client(Scenario::new(seed, END).without_drives());
+    client.listen(AWAKE);
+    client
+}
+
+fn all_enabled(world: &World<'_>) -> bool {
+    world.statuses().flatten().all(|status| enabled(&status))
 }
 
 fn at(index: u16, sub: u8) -> Address {
     Address::new(index, sub)
+}
+
+#[track_caller]
+fn refused<T: std::fmt::Debug>(result: Result<T, SdoError>, expected: AbortCode) {
+    match result {
+        Err(SdoError::Aborted { code, .. }) => assert_eq!(code, expected),
+        other => panic!("{other:?}"),
+    }
+}
+
+fn say_nmt(client: &mut Client<'_>, command: Command) {
+    client.say(NodeControl::node(command, MASTER).frame());
+    client.listen(Time::from_ms(30));
+}
+
+/// What the board's last heartbeat within 150 ms says; `None`: there is none.
+fn state(client: &mut Client<'_>) -> Option<u8> {
+    client.take_heard();
+    client.listen(Time::from_ms(150));
+    client.heard_from(HEARTBEAT).last().map(|data| data[0])
 }
 
 #[test]
@@ -126,45 +81,267 @@ fn expedited_segmented_and_block_transfers_beside_the_running_network() {
         let words = client.read(at(0x2F01, 3), protocol).unwrap();
         assert_eq!(words, b"axis 3: operational");
     }
-    // 1F82h: every drive is operational.
-    for node in 1..=6 {
-        assert_eq!(
-            client.read(at(0x1F82, node), Protocol::Normal).unwrap(),
-            [5]
-        );
+    // 1F82h: every drive is operational, and the board itself.
+    for node in [1, 2, 3, 4, 5, 6, 127] {
+        assert_eq!(client.number(0x1F82, node).unwrap(), 5);
     }
     // What follows from the design is constant; the SYNC is not to be touched now.
-    let refused = |result: Result<(), SdoError>, code: u32| match result {
-        Err(SdoError::Aborted { code: got, .. }) => assert_eq!(got.0, code),
-        other => panic!("{other:?}"),
-    };
+    refused(client.put(0x1000, 0, 0, 4), AbortCode::READ_ONLY);
+    refused(client.put(0x1006, 0, 0, 4), AbortCode::DEVICE_STATE);
+    // Nothing is saved while the axes are enabled.
     let normal = Protocol::Normal;
-    refused(client.write(at(0x1000, 0), &[0; 4], normal), 0x0601_0002);
-    refused(client.write(at(0x1006, 0), &[0; 4], normal), 0x0800_0022);
-    // Saving is refused while the axes are enabled.
-    refused(client.write(at(0x1010, 1), b"save", normal), 0x0800_0022);
-    assert!(
-        client
-            .world
-            .statuses()
-            .flatten()
-            .all(|status| enabled(&status))
-    );
+    for (index, signature) in [(0x1010, b"save"), (0x1011, b"load")] {
+        let result = client.write(at(index, 1), signature, normal);
+        refused(result, AbortCode::DEVICE_STATE);
+    }
+    assert!(all_enabled(&client.world));
 }
 
 #[test]
 fn the_heartbeat_follows_1017h() {
     let mut client = in_standby(32);
-    client
-        .write(at(0x1017, 0), &100_u16.to_le_bytes(), Protocol::Normal)
-        .unwrap();
-    while client.world.hear().is_some() {}
-    let until = client.world.now() + Time::from_ms(2000);
-    client.world.run_until(until);
-    let heard = std::iter::from_fn(|| client.world.hear());
-    let own = heard
-        .filter_map(|frame| Frame::try_from(frame).ok())
-        .filter(|frame| frame.id().get() == 0x77F);
-    let count = own.count();
+    client.put(0x1017, 0, 100, 2).unwrap();
+    client.take_heard();
+    client.listen(Time::from_ms(2000));
+    let count = client.heard_from(HEARTBEAT).len();
     assert!((19..=21).contains(&count), "{count} heartbeats in 2 s");
+}
+
+#[test]
+fn the_boot_up_message_comes_before_the_first_heartbeat() {
+    let mut client = alone(33);
+    let heard = client.heard_from(HEARTBEAT);
+    assert_eq!(heard[0], [0]);
+    assert!(heard.len() > 1 && heard[1..].iter().all(|data| *data == [0x7F]));
+}
+
+/// CiA 301, 7.3.2.2: the services of each state, beside a network that is not
+/// there.
+#[test]
+fn nmt_commands_from_the_bus_are_obeyed_while_no_axis_is_enabled() {
+    let mut client = alone(34);
+    assert_eq!(state(&mut client), Some(0x7F));
+    // The network is not started: operational has to wait for that.
+    say_nmt(&mut client, Command::Start);
+    assert_eq!(state(&mut client), Some(0x7F));
+    say_nmt(&mut client, Command::Stop);
+    assert_eq!(state(&mut client), Some(0x04));
+    assert!(matches!(
+        client.number(0x1000, 0),
+        Err(SdoError::Timeout { .. })
+    ));
+    say_nmt(&mut client, Command::EnterPreOperational);
+    assert_eq!(state(&mut client), Some(0x7F));
+    assert_eq!(client.number(0x1000, 0).unwrap(), 0);
+    // To somebody else.
+    client.say(NodeControl::node(Command::Stop, NodeId::constant::<126>()).frame());
+    client.listen(Time::from_ms(30));
+    assert_eq!(state(&mut client), Some(0x7F));
+    // A reset takes back what was not saved.
+    for command in [Command::ResetCommunication, Command::ResetNode] {
+        client.put(0x1017, 0, 200, 2).unwrap();
+        client.take_heard();
+        say_nmt(&mut client, command);
+        client.listen(AWAKE);
+        assert_eq!(client.heard_from(HEARTBEAT)[0], [0]);
+        assert_eq!(client.number(0x1017, 0).unwrap(), 50);
+    }
+    // The same by 1F82h.
+    client.put(0x1F82, 127, 7, 1).unwrap();
+    client.take_heard();
+    client.listen(AWAKE);
+    assert_eq!(client.heard_from(HEARTBEAT)[0], [0]);
+    client.put(0x1F82, 127, 4, 1).unwrap();
+    client.listen(Time::from_ms(30));
+    assert_eq!(state(&mut client), Some(0x04));
+}
+
+#[test]
+fn no_command_takes_the_master_from_enabled_axes() {
+    let mut client = in_standby(35);
+    for value in [4, 6, 7, 127] {
+        refused(client.put(0x1F82, 127, value, 1), AbortCode::DEVICE_STATE);
+    }
+    for command in [
+        Command::Stop,
+        Command::EnterPreOperational,
+        Command::ResetNode,
+        Command::ResetCommunication,
+    ] {
+        say_nmt(&mut client, command);
+    }
+    assert_eq!(state(&mut client), Some(5));
+    assert!(all_enabled(&client.world));
+}
+
+#[test]
+fn stopping_all_nodes_stops_the_board_once_the_axes_are_off() {
+    let mut client = in_standby(36);
+    client.say(NodeControl::all(Command::Stop).frame());
+    client.listen(Time::from_ms(1500));
+    assert_eq!(state(&mut client), Some(0x04));
+    // No SYNC and no PDO in stopped.
+    let heard = client.take_heard();
+    let forbidden = |(_, frame): &&(Time, Frame)| matches!(frame.id().get(), 0x080 | 0x201..=0x206 | 0x301..=0x306);
+    assert_eq!(heard.iter().find(forbidden), None);
+}
+
+#[test]
+fn a_board_that_is_not_the_nmt_master_lives_under_another() {
+    let mut client = alone(37);
+    client.put(0x1F80, 0, 0, 4).unwrap();
+    client
+        .write(at(0x1010, 1), b"save", Protocol::Normal)
+        .unwrap();
+    client.take_heard();
+    say_nmt(&mut client, Command::ResetNode);
+    client.listen(Time::from_ms(3000));
+    let heard = client.take_heard();
+    let first = heard
+        .iter()
+        .position(|(_, frame)| frame.data() == [0] && frame.id().get() == HEARTBEAT);
+    let after = &heard[first.expect("it boots")..];
+    // Nothing but error control: no NMT, no SDO, no SYNC.
+    for (time, frame) in after {
+        assert_eq!(frame.id().get(), HEARTBEAT, "{time:?}: {frame:?}");
+    }
+    let states: Vec<u8> = after[1..]
+        .iter()
+        .map(|(_, frame)| frame.data()[0])
+        .collect();
+    assert!(states.len() > 50 && states.iter().all(|state| *state == 0x7F));
+    // It is commanded as any other node.
+    for (command, code) in [
+        (Command::Start, 0x05),
+        (Command::Stop, 0x04),
+        (Command::EnterPreOperational, 0x7F),
+        (Command::Start, 0x05),
+    ] {
+        say_nmt(&mut client, command);
+        assert_eq!(state(&mut client), Some(code));
+    }
+    // It has nobody to command.
+    refused(client.put(0x1F82, 1, 5, 1), AbortCode::DEVICE_STATE);
+    refused(
+        client.write(at(0x1F25, 1), b"conf", Protocol::Normal),
+        AbortCode::DEVICE_STATE,
+    );
+    assert_eq!(client.number(0x1F82, 127).unwrap(), 5);
+}
+
+/// 1029h: 0 pre-operational, 1 no change, 2 stopped.
+#[test]
+fn a_lost_heartbeat_does_to_the_board_what_1029h_says() {
+    for (behaviour, code) in [(0, 0x7F), (1, 0x05), (2, 0x04)] {
+        let mut client = in_standby(38);
+        client.put(0x1029, 1, behaviour, 1).unwrap();
+        let at = client.world.now();
+        client.world.apply(Stimulus::Drive {
+            node: NodeId::constant::<3>(),
+            fault: DriveFault::HeartbeatLost { at },
+        });
+        client.take_heard();
+        client.listen(Time::from_ms(2500));
+        // 8130h: communication and generic, node 3.
+        let told = client.heard_from(EMCY);
+        assert!(
+            told.contains(&vec![0x30, 0x81, 0x11, 3, 0, 0, 0, 0]),
+            "{told:02X?}"
+        );
+        assert_eq!(state(&mut client), Some(code), "1029h = {behaviour}");
+    }
+}
+
+#[test]
+fn a_foreign_node_is_watched_if_1016h_says_so() {
+    let mut client = alone(39);
+    // Node 9, which the network does not name, takes the place of node 1.
+    client.put(0x1016, 1, 9 << 16 | 100, 4).unwrap();
+    client.put(0x1029, 1, 2, 1).unwrap();
+    let beat = Frame::data_frame(CobId::new(0x709).unwrap(), &[5]).unwrap();
+    for _ in 0..5 {
+        client.say(beat);
+        client.listen(Time::from_ms(80));
+    }
+    assert_eq!(state(&mut client), Some(STOPPED));
+}
+
+#[test]
+fn pdos_of_wrong_length_are_told() {
+    let mut client = alone(40);
+    client.take_heard();
+    for (len, code) in [(5, 0x10), (8, 0x20)] {
+        let frame = Frame::data_frame(CobId::new(0x284).unwrap(), &[7; 8][..len]).unwrap();
+        client.say(frame);
+        client.listen(Time::from_ms(1100));
+        let told = client.heard_from(EMCY);
+        // 8210h or 8220h: node 4, TPDO2; over as soon as it is told.
+        assert!(
+            told.contains(&vec![code, 0x82, 0x11, 4, 2, 0, 0, 0]),
+            "{len} bytes: {told:02X?}"
+        );
+    }
+    assert_eq!(client.number(0x1003, 1).unwrap(), 0x0204_8220);
+    assert_eq!(client.number(0x1003, 2).unwrap(), 0x0204_8210);
+    // What was too short was left, what was too long was taken.
+    assert_eq!(client.number(0x3004, 3).unwrap(), 0x0707_0707);
+}
+
+/// CiA 301, 7.5.2.5 .. 7.5.2.7, 7.5.2.22.
+#[test]
+fn the_sync_follows_1005h_1006h_and_1019h_in_pre_operational() {
+    let mut client = alone(41);
+    refused(client.put(0x1006, 0, 65_536, 4), AbortCode::VALUE_TOO_HIGH);
+    refused(client.put(0x1006, 0, 9_999, 4), AbortCode::VALUE_TOO_LOW);
+    refused(client.put(0x1007, 0, 6_999, 4), AbortCode::VALUE_TOO_LOW);
+    refused(client.put(0x1007, 0, 10_001, 4), AbortCode::VALUE_TOO_HIGH);
+    refused(client.put(0x1019, 0, 3, 1), AbortCode::DEVICE_STATE);
+    client.put(0x1006, 0, 0, 4).unwrap();
+    client.put(0x1019, 0, 3, 1).unwrap();
+    client.put(0x1006, 0, 20_000, 4).unwrap();
+    client.put(0x1007, 0, 15_000, 4).unwrap();
+    client.take_heard();
+    client.put(0x1005, 0, 0x4000_0080, 4).unwrap();
+    client.listen(Time::from_ms(100));
+    let heard = client.heard_from(0x080);
+    assert!((4..=6).contains(&heard.len()), "{heard:?}");
+    for (counter, data) in [1, 2, 3].iter().cycle().zip(&heard) {
+        assert_eq!(data, &[*counter]);
+    }
+    // Stopped: no SYNC, and the counter begins anew.
+    say_nmt(&mut client, Command::Stop);
+    client.take_heard();
+    client.listen(Time::from_ms(100));
+    assert!(client.heard_from(0x080).is_empty());
+    say_nmt(&mut client, Command::EnterPreOperational);
+    assert_eq!(client.heard_from(0x080)[0], [1]);
+    client.put(0x1005, 0, 0x80, 4).unwrap();
+    client.take_heard();
+    client.listen(Time::from_ms(100));
+    assert!(client.heard_from(0x080).is_empty());
+}
+
+/// CiA 301, 7.2.6.
+#[test]
+fn time_is_sent_once_the_clock_is_set() {
+    let mut client = alone(42);
+    client.put(0x2F11, 0, 100, 2).unwrap();
+    client.put(0x1012, 0, 0x4000_0100, 4).unwrap();
+    client.listen(Time::from_ms(300));
+    assert!(client.heard_from(0x100).is_empty());
+    // 2026-11-22, 12:00: day 15 666.
+    let noon = [0x00, 0x2E, 0x93, 0x02, 0x32, 0x3D];
+    client
+        .write(at(0x2F10, 0), &noon, Protocol::Normal)
+        .unwrap();
+    client.take_heard();
+    client.listen(Time::from_ms(1000));
+    let heard = client.heard_from(0x100);
+    assert!((9..=11).contains(&heard.len()), "{}", heard.len());
+    let ms = |data: &Vec<u8>| u32::from_le_bytes(data[..4].try_into().unwrap());
+    for pair in heard.windows(2) {
+        let step = ms(&pair[1]) - ms(&pair[0]);
+        assert!((99..=101).contains(&step), "{step} ms");
+        assert_eq!(pair[0][4..], noon[4..]);
+    }
 }

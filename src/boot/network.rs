@@ -93,9 +93,13 @@ impl<const N: usize> NetworkBoot<N> {
     }
 
     /// Takes over changed settings. What was done to a node already is done again
-    /// only at its next boot-up.
+    /// only at its next boot-up; whether this device is the NMT master can be
+    /// changed only in the silent phase.
     pub fn set_settings(&mut self, settings: &Settings<N>) {
         self.startup = settings.startup;
+        if matches!(self.phase, Phase::Silent { .. }) && !self.startup.has(Startup::MASTER) {
+            self.phase = Phase::NotMaster;
+        }
         self.boot_time = settings.boot_time;
         for (node, settings) in self.nodes.iter_mut().zip(&settings.nodes) {
             node.set_settings(*settings);

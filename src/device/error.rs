@@ -34,7 +34,7 @@ pub enum MasterError {
     PdoMissing {
         /// Whose.
         node: NodeId,
-        /// 1 ..= 4.
+        /// 1 ..= 4; 0: any.
         tpdo: u8,
     },
     /// 6010h: the watchdog has reset the board.
@@ -58,6 +58,13 @@ pub enum MasterError {
 }
 
 impl MasterError {
+    /// The code of [`PdoMissing`](MasterError::PdoMissing).
+    pub const PDO_MISSING: EmcyCode = EmcyCode(0x8250);
+    /// The code of [`BootFailed`](MasterError::BootFailed).
+    pub const BOOT_FAILED: EmcyCode = EmcyCode(0xFF40);
+    /// The code of [`AxisFault`](MasterError::AxisFault).
+    pub const AXIS_FAULT: EmcyCode = EmcyCode(0xFF41);
+
     /// The emergency that reports it, with the bits of the error register that
     /// it sets.
     pub const fn emcy(self) -> Emcy {
@@ -81,16 +88,18 @@ impl MasterError {
                 of(code, COMMUNICATION, [node.get(), tpdo, 0])
             }
             MasterError::PdoMissing { node, tpdo } => {
-                of(0x8250, COMMUNICATION, [node.get(), tpdo, 0])
+                of(Self::PDO_MISSING.0, COMMUNICATION, [node.get(), tpdo, 0])
             }
             MasterError::Watchdog => of(0x6010, GENERIC, NOBODY),
             MasterError::Storage => of(0x5530, GENERIC, NOBODY),
-            MasterError::BootFailed { node, letter } => {
-                of(0xFF40, OF_MANUFACTURER, [node.get(), letter, 0])
-            }
+            MasterError::BootFailed { node, letter } => of(
+                Self::BOOT_FAILED.0,
+                OF_MANUFACTURER,
+                [node.get(), letter, 0],
+            ),
             MasterError::AxisFault { node, code } => {
                 let [low, high] = code.0.to_le_bytes();
-                of(0xFF41, OF_MANUFACTURER, [node.get(), low, high])
+                of(Self::AXIS_FAULT.0, OF_MANUFACTURER, [node.get(), low, high])
             }
         }
     }

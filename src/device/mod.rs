@@ -42,7 +42,7 @@ pub use node_record::NodeStatus;
 pub use settings::{Setting, Settings};
 
 use crate::boot::{self, Startup};
-use crate::emcy::{self, Emcy};
+use crate::emcy::{self, Emcy, EmcyCode};
 use crate::frame::{Frame, MAX_DATA};
 use crate::id::NodeId;
 use crate::network::Network;
@@ -232,6 +232,31 @@ impl<const N: usize> Device<N> {
     /// it came.
     pub fn clear(&mut self, error: MasterError) {
         self.dictionary.errors.clear(error.emcy());
+    }
+
+    /// All errors with this code have gone, or those of a node alone.
+    pub fn clear_all(&mut self, code: EmcyCode, node: Option<NodeId>) {
+        self.dictionary.errors.clear_all(&|error| {
+            let [about, ..] = error.manufacturer;
+            error.code == code && node.is_none_or(|node| node.get() == about)
+        });
+    }
+
+    /// Whether the device was the NMT master (1F80h, bit 0) when its settings were
+    /// loaded: a change of that bit takes effect at the next start.
+    pub const fn is_master(&self) -> bool {
+        self.dictionary.is_master
+    }
+
+    /// The NMT state of the device.
+    pub const fn state(&self) -> State {
+        self.dictionary.state
+    }
+
+    /// Whether an axis is enabled, as [`set_axes_enabled`](Self::set_axes_enabled)
+    /// told it last.
+    pub const fn axes_enabled(&self) -> bool {
+        self.dictionary.axes_enabled
     }
 
     /// What a client caused: to be called until it returns `None`, after every

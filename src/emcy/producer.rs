@@ -86,8 +86,13 @@ impl Producer {
     /// An error has gone: its code and the manufacturer's bytes are those that
     /// it was raised with.
     pub fn clear(&mut self, error: Emcy) {
+        self.clear_all(&|active| same(active, &error));
+    }
+
+    /// All errors that `gone` picks have gone; they are told of by one message.
+    pub fn clear_all(&mut self, gone: &dyn Fn(&Emcy) -> bool) {
         let before = self.active.len();
-        self.active.retain(|active| !same(active, &error));
+        self.active.retain(|active| !gone(active));
         if self.active.len() != before {
             let none = Emcy::new(EmcyCode::NO_ERROR, ErrorRegister::default());
             self.send(none);

@@ -24,18 +24,18 @@ mod app {
         axes::Axes,
         control::Control,
         counters::{self, Counts},
-        duties::{act, obey, order_boot, serve},
+        duties::{act, begin, obey, order_boot, serve},
         filters::{self, Handler},
         leds,
         log::{Log, News, UPTIME_MS},
-        own_node::{Order, OwnNode},
+        own_node::{Order, OwnNode, Storage},
         report::{publish, tell},
         roll::{self, Task},
         wake,
     };
     use canmaster::{
         Frame,
-        boot::{Action, NetworkBoot},
+        boot::NetworkBoot,
         design::{self, AXES},
         device::MasterError,
         id::{CobId, FunctionCode},
@@ -115,6 +115,7 @@ mod app {
         requests: Consumer<'static, Frame>,
         orders_to: Producer<'static, Order>,
         sync_period: timers::SyncPeriod,
+        store: Option<Storage>,
     }
 
     /// Sets up the board and hands each task its part. Runs with interrupts off,
@@ -158,6 +159,10 @@ mod app {
         let (orders_to, orders) = cx.local.order_queue.split();
         let sync = defmt::unwrap!(can::Element::new(&Frame::empty(CobId::SYNC)));
         defmt::unwrap!(sdo_configurator::spawn().ok());
+        let own = place(cx.local.own_place, new_own_node);
+        let boot = place(cx.local.boot_place, new_boot);
+        let store = own.load(board.storage);
+        boot.set_settings(&own.device.settings().boot());
         (
             Shared {
                 od: MasterOd::new(cx.local.lengths),
@@ -197,15 +202,16 @@ mod app {
                 known_bus: can::ErrorState::Active,
                 reset_cause: board.reset_cause,
                 clock: board.microseconds,
-                boot: place(cx.local.boot_place, new_boot),
+                boot,
                 answers,
                 states,
                 news,
                 events,
-                own: place(cx.local.own_place, new_own_node),
+                own,
                 requests,
                 orders_to,
                 sync_period: board.sync_period,
+                store,
             },
         )
     }
@@ -250,6 +256,7 @@ mod app {
             if !od.sync_producer() {
                 return;
             }
+            sync.set_byte(od.count_sync());
             if can_tx.holds(CobId::SYNC.into()) || can_tx.transmit(sync).is_err() {
                 counters::SYNC_NOT_SENT.count();
             }
@@ -316,7 +323,7 @@ mod app {
                     match cx.shared.od.lock(|od| od.store(slot, data, length)) {
                         Reception::Stored => {}
                         Reception::Last => rtic::pend(Interrupt::TIM3),
-                        Reception::WrongLength => counters::TPDO_LENGTH.count(),
+                        Reception::TooShort => counters::TPDO_LENGTH.count(),
                     }
                 }
                 Handler::Emcy | Handler::ErrorControl => {
@@ -393,7 +400,7 @@ mod app {
             return;
         };
         let control = cx.shared.control.lock(Control::take);
-        if !control.started {
+        if !control.leads() {
             return;
         }
         let axes = cx.local.axes;
@@ -404,7 +411,10 @@ mod app {
             control.axes_enabled = enabled;
             *commands = *axes.commands();
         });
-        if !control.bus_off {
+        if control.window_us != 0 && cx.local.deadline.elapsed_us() > control.window_us {
+            // What comes after the window of the SYNC is not sent any more.
+            counters::RPDO_REPLACED.count();
+        } else if !control.bus_off {
             axes.write(
                 |frame| match cx.shared.tx_queue.lock(|queue| queue.put_latest(frame)) {
                     Ok(Put::Queued) => {}
@@ -477,6 +487,7 @@ mod app {
             match order {
                 Order::Heartbeat(time) => *local.heartbeat_time = time,
                 Order::Consumer(node, time) => local.supervisor.set_consumer_time(node, time),
+                Order::Watch(other) => local.supervisor.watch(other),
             }
         }
         if control.speaking && local.heartbeat.period() != *local.heartbeat_time {
@@ -494,9 +505,12 @@ mod app {
             local.error_led.set(leds::error(&control, bus, lost, now));
         }
         if local.milliseconds.is_multiple_of(design::COUNTS_MS) {
-            let overruns = cx.shared.od.lock(|od| od.overruns());
+            let (overruns, wrong_length) = cx
+                .shared
+                .od
+                .lock(|od| (od.overruns(), od.take_wrong_length()));
             let overflows = cx.shared.tx_queue.lock(|queue| queue.overflows());
-            let counts = Counts::now(overruns, overflows);
+            let counts = Counts::now(overruns, wrong_length, overflows);
             if counts != *local.counts {
                 *local.counts = counts;
                 publish(local.news_to, News::Counts(counts));
@@ -522,7 +536,7 @@ mod app {
         priority = 1,
         local = [
             reset_cause, clock, boot, answers, states, news, events, own, requests, orders_to,
-            sync_period,
+            sync_period, store,
         ],
         shared = [od, tx_queue, control, commands]
     )]
@@ -543,18 +557,17 @@ mod app {
         if *local.reset_cause == ResetCause::Watchdog {
             own.device.raise(MasterError::Watchdog);
         }
+        if local.store.is_none() {
+            defmt::warn!("settings are not stored (1010h): set option bit DBANK, then flash again");
+        }
+        begin(own, local.sync_period, local.orders_to, &mut cx.shared);
         loop {
             // The time first, then one frame at a time: each may cause several
             // actions, which are carried out before the next.
             loop {
                 while let Some(action) = boot.poll(now(*local.clock)) {
-                    if let Action::Report(event) = &action {
-                        own.boot(event);
-                    }
-                    if action == Action::ProduceSync {
-                        own.device.set_sync_producer(true);
-                    }
-                    act(&action, &mut log, &mut cx.shared);
+                    let period = &mut *local.sync_period;
+                    act(&action, own, period, &mut log, &mut cx.shared);
                 }
                 let state = || {
                     local
@@ -576,7 +589,14 @@ mod app {
                 log.group(&event);
             }
             let mut patience = design::CONFIGURATOR_PERIOD;
-            while serve(own, local.requests, now(*local.clock), &mut cx.shared) {
+            while serve(
+                own,
+                local.store,
+                local.sync_period,
+                local.requests,
+                now(*local.clock),
+                &mut cx.shared,
+            ) {
                 while let Some(event) = own.device.take_event() {
                     obey(
                         &event,

@@ -24,6 +24,11 @@ pub struct Control {
     pub(crate) axes_enabled: bool,
     /// 1006h is not the cycle that the group is made for: no axis is enabled.
     pub(crate) cycle_differs: bool,
+    /// 1007h, microseconds; 0: none.
+    pub(crate) window_us: u16,
+    /// The NMT state that a command has brought the board to; `None`: the one
+    /// that the start of the network has.
+    pub(crate) commanded: Option<nmt::State>,
 }
 
 impl Control {
@@ -38,6 +43,8 @@ impl Control {
             bus_off: false,
             axes_enabled: false,
             cycle_differs: false,
+            window_us: 0,
+            commanded: None,
         }
     }
 
@@ -45,20 +52,29 @@ impl Control {
     pub(crate) fn boot(&mut self, event: &Event) {
         match event {
             Event::ResetSent => self.speaking = true,
-            Event::StartSent => self.started = true,
+            Event::StartSent => {
+                self.started = true;
+                self.commanded = None;
+            }
             Event::NetworkReady => self.network_ready = true,
             Event::NetworkFailed => self.boot_failed = true,
             _ => {}
         }
     }
 
-    /// The NMT state of the master itself.
+    /// The NMT state of the board itself.
     pub(crate) const fn state(&self) -> nmt::State {
-        match (self.speaking, self.started) {
-            (false, _) => nmt::State::Initialising,
-            (true, false) => nmt::State::PreOperational,
-            (true, true) => nmt::State::Operational,
+        match (self.speaking, self.commanded, self.started) {
+            (false, ..) => nmt::State::Initialising,
+            (true, Some(state), _) => state,
+            (true, None, false) => nmt::State::PreOperational,
+            (true, None, true) => nmt::State::Operational,
         }
+    }
+
+    /// Whether PDOs are exchanged with the drives.
+    pub(crate) const fn leads(&self) -> bool {
+        self.started && matches!(self.state(), nmt::State::Operational)
     }
 
     /// Tells the group of a fault; of several between two cycles, the first.

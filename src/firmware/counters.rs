@@ -1,6 +1,7 @@
 //! What must not happen and is counted if it does. The interrupt tasks count,
 //! `network` reports each change.
 
+use canmaster::master::WrongLength;
 use core::sync::atomic::{AtomicU32, Ordering};
 
 /// A counter that any task may increment.
@@ -24,13 +25,14 @@ impl Counter {
 
 /// SYNCs not sent because the last one was still waiting for the bus.
 pub(crate) static SYNC_NOT_SENT: Counter = Counter::new();
-/// RPDOs that were still waiting when the next one came.
+/// RPDOs that were still waiting when the next one came, or that came too late
+/// for the window of the SYNC.
 pub(crate) static RPDO_REPLACED: Counter = Counter::new();
 /// Received frames that the controller lost because a FIFO was full.
 pub(crate) static RX_OVERRUNS: Counter = Counter::new();
 /// Received frames lost because a task's queue was full.
 pub(crate) static RX_QUEUE_FULL: Counter = Counter::new();
-/// TPDOs of a length that is not the mapped one.
+/// TPDOs shorter than mapped.
 pub(crate) static TPDO_LENGTH: Counter = Counter::new();
 
 /// Lines that found the queue to the log full.
@@ -48,12 +50,18 @@ pub(crate) struct Counts {
     pub(crate) rx_overruns: u32,
     pub(crate) rx_queue_full: u32,
     pub(crate) tpdo_length: u32,
+    /// The last TPDO of wrong length since the counts before.
+    pub(crate) wrong_length: Option<WrongLength>,
     pub(crate) log_full: u32,
 }
 
 impl Counts {
     /// The counters here, and the two that others keep.
-    pub(crate) fn now(cycle_overruns: u32, tx_overflows: u32) -> Counts {
+    pub(crate) fn now(
+        cycle_overruns: u32,
+        wrong_length: Option<WrongLength>,
+        tx_overflows: u32,
+    ) -> Counts {
         Counts {
             sync_not_sent: SYNC_NOT_SENT.get(),
             rpdo_replaced: RPDO_REPLACED.get(),
@@ -62,6 +70,7 @@ impl Counts {
             rx_overruns: RX_OVERRUNS.get(),
             rx_queue_full: RX_QUEUE_FULL.get(),
             tpdo_length: TPDO_LENGTH.get(),
+            wrong_length,
             log_full: LOG_FULL.get(),
         }
     }

@@ -4,7 +4,7 @@
 use crate::{
     app::app::sdo_configurator::SharedResources as Shared,
     log::Log,
-    own_node::{Mirror, Order, OwnNode},
+    own_node::{Mirror, Order, OwnNode, Storage},
 };
 use canmaster::{
     Frame,
@@ -12,7 +12,7 @@ use canmaster::{
     design::{self, AXES},
     device::{Event, Setting},
     master::TpdoSlots,
-    nmt::{Command, NodeControl},
+    nmt::{Command, NodeControl, Service, State, Target},
     time::Instant,
 };
 use heapless::spsc::{Consumer, Producer};
@@ -23,26 +23,36 @@ use rtic::Mutex;
 /// there was neither.
 pub(crate) fn serve(
     own: &mut OwnNode,
+    store: &mut Option<Storage>,
+    period: &mut timers::SyncPeriod,
     requests: &mut Consumer<'static, Frame>,
     now: Instant,
     shared: &mut Shared<'_>,
 ) -> bool {
-    let control = shared.control.lock(|control| *control);
+    let control = shared.control.lock(|control| {
+        own.carry_out(control, now);
+        *control
+    });
+    own.restart(now);
     let room = shared
         .tx_queue
         .lock(|queue| queue.len() < design::OWN_FRAMES);
     let board = &mut Mirror {
         network: own.network(),
+        store,
         od: &mut shared.od,
         commands: &mut shared.commands,
     };
-    own.update(&control, board, now);
+    let changed = own.update(&control, board, now);
     let request = requests.dequeue();
     let frame = match &request {
-        Some(request) => own.device.on_frame(request, now, board),
+        Some(request) => own.on_frame(request, now, board),
         None if room => own.device.poll(now, board),
         None => None,
     };
+    if changed {
+        take_over(Setting::SyncCobId, own, period, shared);
+    }
     if let Some(frame) = frame {
         send(frame, shared);
     }
@@ -74,11 +84,20 @@ pub(crate) fn obey(
 pub(crate) fn order_boot(
     event: &Event,
     boot: &mut NetworkBoot<AXES>,
-    own: &OwnNode,
+    own: &mut OwnNode,
     now: Instant,
 ) -> bool {
     let control = match *event {
-        Event::Nmt(control) => control,
+        Event::Nmt(control) => {
+            own.command(control);
+            // The boot-up has no say in what the board itself does, except that it
+            // starts the network.
+            let mine = control.target == Target::Node(own.network().master.node);
+            if mine && (control.command != Command::Start || !own.device.is_master()) {
+                return false;
+            }
+            control
+        }
         // It is configured whenever it boots.
         Event::Configure(target) => NodeControl {
             command: Command::ResetCommunication,
@@ -96,6 +115,32 @@ pub(crate) fn order_boot(
     true
 }
 
+/// Takes over the settings that were loaded, before the network is started. A
+/// board that is not the NMT master has no network to wait for.
+pub(crate) fn begin(
+    own: &OwnNode,
+    period: &mut timers::SyncPeriod,
+    orders: &mut Producer<'static, Order>,
+    shared: &mut Shared<'_>,
+) {
+    for setting in [
+        Setting::SyncOverflow,
+        Setting::ProducerHeartbeat,
+        Setting::ConsumerHeartbeat(0),
+    ] {
+        obey(&Event::Changed(setting), own, period, orders, shared);
+    }
+    if !own.device.is_master() {
+        speak(own.boot_up(), shared);
+    }
+}
+
+/// The board leaves initialising, with its boot-up message.
+fn speak(boot_up: Frame, shared: &mut Shared<'_>) {
+    send(boot_up, shared);
+    shared.control.lock(|control| control.speaking = true);
+}
+
 /// Takes over a setting that a client has changed.
 fn take_over(
     setting: Setting,
@@ -103,26 +148,32 @@ fn take_over(
     period: &mut timers::SyncPeriod,
     shared: &mut Shared<'_>,
 ) {
-    if !matches!(setting, Setting::SyncCobId | Setting::SyncPeriod) {
+    if !matches!(
+        setting,
+        Setting::SyncCobId | Setting::SyncPeriod | Setting::SyncWindow | Setting::SyncOverflow
+    ) {
         return;
     }
     let sync = own.device.settings().sync();
-    let us = u16::try_from(sync.period()).ok().filter(|us| *us != 0);
-    if let Some(us) = us {
+    // Nothing longer is taken.
+    let us = sync.period() as u16;
+    if us != 0 {
         period.set_us(us);
-    } else {
-        defmt::warn!(
-            "no SYNC: its period (1006h) is {=u32} us, at most {=u16} possible",
-            sync.period(),
-            u16::MAX
-        );
     }
     let differs = sync.period() != own.network().cycle.as_micros();
-    let produces = sync.cob_id().is_producer() && us.is_some();
-    shared
-        .control
-        .lock(|control| control.cycle_differs = differs);
-    shared.od.lock(|od| od.set_sync_producer(produces));
+    let state = own.device.state();
+    let produces = sync.is_producing() && state.allows(Service::Sync);
+    let anew = setting == Setting::SyncOverflow || state == State::Stopped;
+    shared.control.lock(|control| {
+        control.cycle_differs = differs;
+        control.window_us = sync.window() as u16;
+    });
+    shared.od.lock(|od| {
+        od.set_sync_producer(produces);
+        if anew {
+            od.set_sync_counter(sync.counter());
+        }
+    });
 }
 
 /// Queues a frame. A full queue counts it: an SDO request is repeated, by us
@@ -133,15 +184,29 @@ fn send(frame: Frame, shared: &mut Shared<'_>) {
 }
 
 /// Carries out what the boot-up asks for.
-pub(crate) fn act(action: &Action, log: &mut Log, shared: &mut Shared<'_>) {
+pub(crate) fn act(
+    action: &Action,
+    own: &mut OwnNode,
+    period: &mut timers::SyncPeriod,
+    log: &mut Log,
+    shared: &mut Shared<'_>,
+) {
     match action {
         Action::Send(frame) => send(*frame, shared),
-        Action::ProduceSync => shared.od.lock(|od| od.set_sync_producer(true)),
+        Action::ProduceSync => {
+            own.device.set_sync_producer(true);
+            take_over(Setting::SyncCobId, own, period, shared);
+        }
         // Only asked for after `NetworkBoot::bus_off`, which nobody calls: the
         // controller stays bus-off until the board is reset.
         Action::RestartController => {}
         Action::Report(event) => {
-            if *event == boot::Event::StartSent {
+            own.boot(event);
+            if *event == boot::Event::ResetSent && !shared.control.lock(|control| control.speaking)
+            {
+                speak(own.boot_up(), shared);
+            }
+            if matches!(event, boot::Event::StartSent) {
                 shared.od.lock(|od| od.expect(TpdoSlots::all_of(AXES)));
             }
             shared.control.lock(|control| control.boot(event));

@@ -14,7 +14,7 @@ pub(crate) enum Handler {
     SdoResponse,
     /// Boot-up and heartbeat.
     ErrorControl,
-    /// For the board itself: an SDO request, TIME.
+    /// For the board itself: an SDO request, TIME, NMT.
     Request,
 }
 
@@ -40,7 +40,7 @@ const fn one(identifier: u16) -> RangeFilter {
 
 /// The filters. Process data and the rest come through different FIFOs, so that
 /// a burst of one does not push out the other.
-pub(crate) static FILTERS: [RangeFilter; 7] = [
+pub(crate) static FILTERS: [RangeFilter; 8] = [
     nodes(FunctionCode::Tpdo1, Fifo::Fifo0),
     nodes(FunctionCode::Tpdo2, Fifo::Fifo0),
     nodes(FunctionCode::Emcy, Fifo::Fifo1),
@@ -48,6 +48,7 @@ pub(crate) static FILTERS: [RangeFilter; 7] = [
     nodes(FunctionCode::ErrorControl, Fifo::Fifo1),
     one(CobId::of(FunctionCode::SdoRequest, sample::SIX_EPOS4.master.node).get()),
     one(CobId::TIME.get()),
+    one(CobId::NMT.get()),
 ];
 
 /// The handler of each filter.
@@ -57,6 +58,7 @@ pub(crate) static HANDLERS: [Handler; FILTERS.len()] = [
     Handler::Emcy,
     Handler::SdoResponse,
     Handler::ErrorControl,
+    Handler::Request,
     Handler::Request,
     Handler::Request,
 ];

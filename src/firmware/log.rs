@@ -81,7 +81,7 @@ impl Log {
             }
             News::ErrorState(ErrorState::Active) => info!("CAN controller error active again"),
             News::Counts(counts) => warn!(
-                "so far: {=u32} SYNC not sent, {=u32} RPDO sent late or not, {=u32} cycles overrun, {=u32} frames not queued, {=u32} receive overruns, {=u32} receive queue full, {=u32} TPDO of wrong length, {=u32} log lines lost",
+                "so far: {=u32} SYNC not sent, {=u32} RPDO sent late or not, {=u32} cycles overrun, {=u32} frames not queued, {=u32} receive overruns, {=u32} receive queue full, {=u32} TPDO too short, {=u32} log lines lost",
                 counts.sync_not_sent,
                 counts.rpdo_replaced,
                 counts.cycle_overruns,

@@ -1,5 +1,12 @@
 //! The board as a CANopen device: what the other tasks know goes into its
 //! object dictionary, what clients change comes out.
+//!
+//! NMT commands for the board, from the bus or by 1F82h, and what 1029h orders on
+//! a communication error, are carried out whether or not it is the NMT master
+//! (1F80h, bit 0), but never while an axis is enabled, which would be left without
+//! its master: 1F82h is refused then, a command from the bus to the board alone is
+//! left, and one to all nodes waits until the axes, whose drives have heard it
+//! too, are off. Reset node and reset communication both start the board anew.
 
 use crate::{control::Control, log::News};
 use canmaster::{
@@ -8,14 +15,16 @@ use canmaster::{
     design::{self, AXES},
     device::{self, Description, Device, Identity, MasterError, Setting, Settings},
     emcy::EmcyCode,
-    master::{self, MasterOd, Notice, TpdoSlot},
-    motion::{AxisCommand, FaultCause, GroupEvent},
+    master::{self, MasterOd, Notice, TpdoSlot, WrongLength},
+    motion::{AxisCommand, FaultCause, GroupEvent, GroupState},
     network::Network,
-    nmt::{ErrorControl, State},
+    nmt::{Command, ErrorControl, NodeControl, State, Target},
     sdo::AbortCode,
+    store::{self, Store},
     time::{Duration, Instant},
 };
-use nucleo_g474re::can::ErrorState;
+use cortex_m::peripheral::SCB;
+use nucleo_g474re::{can::ErrorState, flash};
 use rtic::Mutex;
 
 /// How long an SDO transfer of a client may stand still.
@@ -35,6 +44,18 @@ fn description() -> Description {
     }
 }
 
+/// Where the settings are kept.
+pub(crate) type Storage = Store<flash::Storage>;
+
+/// The last two pages of bank 2.
+const PAGES: [u32; 2] = [
+    (flash::PAGES as usize - 2) as u32 * flash::PAGE_BYTES as u32,
+    (flash::PAGES as usize - 1) as u32 * flash::PAGE_BYTES as u32,
+];
+
+/// How long after an order to start anew the board still answers.
+const LAST_WORDS: Duration = Duration::from_millis(10);
+
 /// What a client has changed that another task has to take over.
 #[derive(Clone, Copy)]
 pub(crate) enum Order {
@@ -42,12 +63,15 @@ pub(crate) enum Order {
     Heartbeat(Duration),
     /// 1016h; zero: not watched.
     Consumer(NodeId, Duration),
+    /// 1016h: a node that the network does not name.
+    Watch(Option<(NodeId, Duration)>),
 }
 
 /// The process data that the object dictionary mirrors: TPDOs as they last came,
 /// and what each axis was last told.
 pub(crate) struct Mirror<'a, O, C> {
     pub(crate) network: &'static Network,
+    pub(crate) store: &'a mut Option<Storage>,
     pub(crate) od: &'a mut O,
     pub(crate) commands: &'a mut C,
 }
@@ -57,13 +81,13 @@ where
     O: Mutex<T = MasterOd<AXES>>,
     C: Mutex<T = [AxisCommand; AXES]>,
 {
-    fn save(&mut self, _: &[u8]) -> Result<(), AbortCode> {
-        // This board keeps nothing over power-off yet.
-        Err(AbortCode::DEVICE_STATE)
+    fn save(&mut self, settings: &[u8]) -> Result<(), AbortCode> {
+        let store = self.store.as_mut().ok_or(AbortCode::DEVICE_STATE)?;
+        Ok(store.save(settings)?)
     }
 
     fn can_save(&self) -> bool {
-        false
+        self.store.is_some()
     }
 
     fn tpdo(&mut self, node: NodeId, number: u8) -> [u8; 8] {
@@ -97,8 +121,12 @@ where
 pub(crate) struct OwnNode {
     pub(crate) device: Device<AXES>,
     network: &'static Network,
-    state: State,
     lost_frames: u32,
+    bus_off: bool,
+    /// An NMT command for the board that waits to be carried out.
+    command: Option<Command>,
+    /// When the board is to start anew.
+    restart_at: Option<Instant>,
 }
 
 impl OwnNode {
@@ -106,8 +134,10 @@ impl OwnNode {
         OwnNode {
             device: Device::new(description(), network, SDO_TIMEOUT),
             network,
-            state: State::Initialising,
             lost_frames: 0,
+            bus_off: false,
+            command: None,
+            restart_at: None,
         }
     }
 
@@ -116,19 +146,101 @@ impl OwnNode {
         self.network
     }
 
-    /// Takes over what the other tasks say of the board itself.
+    /// Takes over the settings that were saved. Not inlined: the bytes are to
+    /// leave the stack.
+    #[inline(never)]
+    pub(crate) fn load(
+        &mut self,
+        flash: Result<flash::Storage, flash::Unavailable>,
+    ) -> Option<Storage> {
+        let mut store = Store::new(flash.ok()?, PAGES).ok()?;
+        let mut buf = [0; store::CAPACITY];
+        match store.load(&mut buf) {
+            Ok(Some(saved)) => self.device.load(saved, Instant::ZERO),
+            Ok(None) => {}
+            Err(_) => self.device.raise(MasterError::Storage),
+        }
+        Some(store)
+    }
+
+    /// The boot-up message, and the first heartbeat may follow.
+    pub(crate) fn boot_up(&self) -> Frame {
+        ErrorControl::heartbeat(self.network.master.node, State::Initialising).frame()
+    }
+
+    /// Takes over what the other tasks say of the board itself, and carries out
+    /// a command that waits. `true`: the NMT state has changed.
     pub(crate) fn update(
         &mut self,
         control: &Control,
         board: &mut impl device::Board,
         now: Instant,
-    ) {
+    ) -> bool {
         self.device.set_axes_enabled(control.axes_enabled);
         let state = control.state();
-        if state != self.state {
-            self.state = state;
+        let changed = state != self.device.state();
+        if changed {
             self.device.set_state(state, board, now);
         }
+        changed
+    }
+
+    /// An NMT command for the board, or for others.
+    pub(crate) fn command(&mut self, control: NodeControl) {
+        let mine = control.target.includes(self.network.master.node);
+        let left = control.target != Target::All && self.device.axes_enabled();
+        if mine && !left {
+            self.command = Some(control.command);
+        }
+    }
+
+    /// Carries out the command that waits, unless an axis is enabled. With
+    /// `control` locked, so that none can be meanwhile.
+    pub(crate) fn carry_out(&mut self, control: &mut Control, now: Instant) {
+        if control.axes_enabled || !control.speaking {
+            return;
+        }
+        let state = match self.command.take() {
+            // The network is started by its boot-up.
+            Some(Command::Start) if self.device.is_master() && !control.started => return,
+            Some(Command::Start) => State::Operational,
+            Some(Command::Stop) => State::Stopped,
+            Some(Command::EnterPreOperational) => State::PreOperational,
+            Some(Command::ResetNode | Command::ResetCommunication) => {
+                self.restart_at.get_or_insert(now + LAST_WORDS);
+                return;
+            }
+            Some(Command::Other(_)) | None => return,
+        };
+        control.commanded = Some(state);
+    }
+
+    /// Starts the board anew if it is time for that.
+    pub(crate) fn restart(&self, now: Instant) {
+        if self.restart_at.is_some_and(|at| now >= at) {
+            SCB::sys_reset();
+        }
+    }
+
+    /// What 1029h orders on a communication error.
+    fn communication_error(&mut self) {
+        let behaviour = self.device.settings().error_behaviour();
+        let command = behaviour.reaction(self.device.state());
+        self.command = command.or(self.command);
+    }
+
+    /// A frame for the board.
+    pub(crate) fn on_frame(
+        &mut self,
+        frame: &Frame,
+        now: Instant,
+        board: &mut impl device::Board,
+    ) -> Option<Frame> {
+        if let Some(control) = NodeControl::decode(frame) {
+            self.command(control);
+            return None;
+        }
+        self.device.on_frame(frame, now, board)
     }
 
     /// A step of the boot-up.
@@ -137,6 +249,10 @@ impl OwnNode {
         if let Event::Failed(node, failure) = *event {
             let letter = failure.status.letter() as u8;
             self.device.raise(MasterError::BootFailed { node, letter });
+        }
+        if let Event::Operational(node) | Event::NodeBack(node) = *event {
+            let code = MasterError::BOOT_FAILED;
+            self.device.clear_all(code, Some(node));
         }
     }
 
@@ -155,39 +271,75 @@ impl OwnNode {
                 Notice::HeartbeatLost(lost) => {
                     self.device.on_node_state(lost.node, None);
                     self.device.raise(MasterError::NodeLost { node: lost.node });
+                    self.communication_error();
                 }
                 Notice::HeartbeatBack(node) => self.device.clear(MasterError::NodeLost { node }),
                 Notice::BootUp(_) | Notice::NotOperational { .. } => {}
             },
-            News::ErrorState(ErrorState::Passive) => self.device.raise(MasterError::ErrorPassive),
-            News::ErrorState(ErrorState::Active) => self.device.clear(MasterError::ErrorPassive),
-            News::ErrorState(ErrorState::Warning | ErrorState::BusOff) => {}
+            News::ErrorState(state) => self.error_state(*state),
             News::Counts(counts) => {
                 let lost = counts.rx_overruns.wrapping_add(counts.rx_queue_full);
                 if lost != self.lost_frames {
                     self.lost_frames = lost;
-                    // It is over as soon as it is told.
-                    self.device.raise(MasterError::Overrun);
-                    self.device.clear(MasterError::Overrun);
+                    self.tell(MasterError::Overrun);
+                }
+                if let Some(WrongLength { slot, short }) = counts.wrong_length
+                    && let Some(node) = self.network.nodes.get(slot.axis())
+                {
+                    self.tell(MasterError::PdoLength {
+                        node: node.id,
+                        tpdo: slot.number() as u8 + 1,
+                        short,
+                    });
                 }
             }
         }
     }
 
+    fn error_state(&mut self, state: ErrorState) {
+        if state == ErrorState::BusOff {
+            self.bus_off = true;
+            self.communication_error();
+        } else if core::mem::take(&mut self.bus_off) {
+            self.tell(MasterError::BusOffRecovered);
+        }
+        match state {
+            ErrorState::Passive => self.device.raise(MasterError::ErrorPassive),
+            ErrorState::Active => self.device.clear(MasterError::ErrorPassive),
+            ErrorState::Warning | ErrorState::BusOff => {}
+        }
+    }
+
+    /// An error that is over as soon as it is told.
+    fn tell(&mut self, error: MasterError) {
+        self.device.raise(error);
+        self.device.clear(error);
+    }
+
     /// What the group reports.
     pub(crate) fn group(&mut self, event: &GroupEvent) {
+        if let GroupEvent::State { to, .. } = event
+            && *to != GroupState::Faulted
+        {
+            for code in [MasterError::AXIS_FAULT, MasterError::PDO_MISSING] {
+                self.device.clear_all(code, None);
+            }
+        }
         if let GroupEvent::Fault {
             axis: Some(axis),
             cause,
         } = event
             && let Some(node) = self.network.nodes.get(usize::from(*axis))
         {
+            let node = node.id;
             let code = match cause {
                 FaultCause::Emergency { code } => EmcyCode(*code),
                 _ => EmcyCode::NO_ERROR,
             };
-            let node = node.id;
-            self.device.raise(MasterError::AxisFault { node, code });
+            self.device.raise(match cause {
+                FaultCause::TpdoMissing { .. } => MasterError::PdoMissing { node, tpdo: 0 },
+                _ => MasterError::AxisFault { node, code },
+            });
         }
     }
 
@@ -201,6 +353,10 @@ impl OwnNode {
                     let time = settings.consumer_time(node.id).unwrap_or(Duration::ZERO);
                     give(Order::Consumer(node.id, time));
                 }
+                let mut consumers = settings.consumers();
+                give(Order::Watch(
+                    consumers.find(|(node, _)| self.network.find(*node).is_none()),
+                ));
             }
             _ => {}
         }

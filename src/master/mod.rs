@@ -19,7 +19,7 @@ pub use axis_map::AxisMap;
 pub use axis_pdo::{feedback, fits, lengths, rpdo1, rpdo2};
 pub use clock::ExtendedClock;
 pub use debounce::Debounce;
-pub use od::{Cycle, MasterOd, Reception, TPDOS_PER_AXIS, TpdoSlot, TpdoSlots};
+pub use od::{Cycle, MasterOd, Reception, TPDOS_PER_AXIS, TpdoSlot, TpdoSlots, WrongLength};
 pub use ramps::Ramps;
 pub use roll_call::RollCall;
 pub use supervisor::{Advice, Notice, Report, Supervisor};

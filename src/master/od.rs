@@ -3,6 +3,7 @@
 //! holds off the SYNC.
 
 use crate::frame::MAX_DATA;
+use crate::sync::SyncCounter;
 
 /// How many TPDOs of each axis the master takes in.
 pub const TPDOS_PER_AXIS: usize = 2;
@@ -84,8 +85,17 @@ pub enum Reception {
     Stored,
     /// It was the last that this SYNC had to bring.
     Last,
-    /// Its length is not that of the mapping: not stored.
-    WrongLength,
+    /// It is shorter than the mapping: not stored (CiA 301, 7.2.2.4).
+    TooShort,
+}
+
+/// A TPDO of another length than mapped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct WrongLength {
+    /// Which.
+    pub slot: TpdoSlot,
+    /// It is shorter, and was left; else it is longer, and its first bytes count.
+    pub short: bool,
 }
 
 /// One cycle, as the PDO producer takes it up.
@@ -103,11 +113,14 @@ pub struct MasterOd<const AXES: usize> {
     /// 1005h, bit 30.
     sync_producer: bool,
     sync_count: u32,
+    /// 1019h.
+    sync_counter: SyncCounter,
     expected: TpdoSlots,
     received: TpdoSlots,
     /// The cycle of the last SYNC has not been taken up yet.
     open: bool,
     overruns: u32,
+    wrong_length: Option<WrongLength>,
     /// The mapped bytes of each TPDO.
     lengths: &'static [[u8; TPDOS_PER_AXIS]; AXES],
     /// What last came.
@@ -121,10 +134,12 @@ impl<const AXES: usize> MasterOd<AXES> {
         MasterOd {
             sync_producer: false,
             sync_count: 0,
+            sync_counter: SyncCounter::NONE,
             expected: TpdoSlots::NONE,
             received: TpdoSlots::NONE,
             open: false,
             overruns: 0,
+            wrong_length: None,
             lengths,
             tpdos: [[[0; MAX_DATA]; TPDOS_PER_AXIS]; AXES],
         }
@@ -140,6 +155,17 @@ impl<const AXES: usize> MasterOd<AXES> {
         self.sync_producer
     }
 
+    /// Counts the SYNCs (1019h) from the start again.
+    pub fn set_sync_counter(&mut self, counter: SyncCounter) {
+        self.sync_counter = counter;
+    }
+
+    /// What the next SYNC carries; `None`: no data.
+    #[inline]
+    pub fn count_sync(&mut self) -> Option<u8> {
+        self.sync_counter.count()
+    }
+
     /// SYNCs sent since the start.
     pub fn sync_count(&self) -> u32 {
         self.sync_count
@@ -153,6 +179,11 @@ impl<const AXES: usize> MasterOd<AXES> {
     /// The TPDOs that each SYNC has to bring from now on.
     pub fn expect(&mut self, slots: TpdoSlots) {
         self.expected = slots;
+    }
+
+    /// The last TPDO of another length than mapped, once.
+    pub fn take_wrong_length(&mut self) -> Option<WrongLength> {
+        self.wrong_length.take()
     }
 
     /// A SYNC was requested: the next cycle begins.
@@ -178,8 +209,13 @@ impl<const AXES: usize> MasterOd<AXES> {
         let (Some(mapped), Some(stored)) = (mapped, stored) else {
             return Reception::Stored;
         };
-        if length != usize::from(*mapped) {
-            return Reception::WrongLength;
+        let mapped = usize::from(*mapped);
+        if length != mapped {
+            let short = length < mapped;
+            self.wrong_length = Some(WrongLength { slot, short });
+            if short {
+                return Reception::TooShort;
+            }
         }
         *stored = data;
         if self.received.contains(slot) {
@@ -311,14 +347,27 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_length_is_not_stored() {
+    fn what_is_too_short_is_left_and_what_is_too_long_is_taken() {
         let mut od = running();
         od.open_cycle();
-        for length in [0, 5, 7, 8] {
+        assert_eq!(od.take_wrong_length(), None);
+        let wrong = |short| {
+            let slot = slot(0, 0);
+            Some(WrongLength { slot, short })
+        };
+        for length in [0, 5] {
             let got = od.store(slot(0, 0), [9; 8], length);
-            assert_eq!(got, Reception::WrongLength);
+            assert_eq!(got, Reception::TooShort);
+            assert_eq!(od.take_wrong_length(), wrong(true));
         }
         assert_eq!(od.tpdo(slot(0, 0)), [0; 8]);
+        for length in [7, 8] {
+            let got = od.store(slot(0, 0), [9; 8], length);
+            assert_eq!(got, Reception::Stored);
+            assert_eq!(od.take_wrong_length(), wrong(false));
+            assert_eq!(od.take_wrong_length(), None);
+        }
+        assert_eq!(od.tpdo(slot(0, 0)), [9; 8]);
     }
 
     #[test]

@@ -173,6 +173,8 @@ pub struct Supervisor<const N: usize> {
     nodes: Vec<Watched, N>,
     /// The network was started: whoever is not operational now is a fault.
     armed: bool,
+    /// A node that the network does not name, and 1016h does.
+    other: Option<Consumer>,
 }
 
 impl<const N: usize> Supervisor<N> {
@@ -192,6 +194,7 @@ impl<const N: usize> Supervisor<N> {
         Supervisor {
             nodes: watched.collect(),
             armed: false,
+            other: None,
         }
     }
 
@@ -214,6 +217,11 @@ impl<const N: usize> Supervisor<N> {
             return Some(self.report(axis, Notice::Emcy { node, emcy }));
         }
         let ErrorControl { node, state, .. } = ErrorControl::decode(frame)?;
+        if let Some(other) = self.other.as_mut().filter(|other| other.node() == node) {
+            let was_lost = other.is_lost();
+            other.heard(state, now);
+            return was_lost.then(|| self.report(None, Notice::HeartbeatBack(node)));
+        }
         let armed = self.armed;
         let (axis, watched) = self
             .nodes
@@ -247,6 +255,9 @@ impl<const N: usize> Supervisor<N> {
     /// Looks for heartbeats that stay away: to be called every millisecond,
     /// until it returns `None`.
     pub fn poll(&mut self, now: Instant) -> Option<Report> {
+        if let Some(lost) = self.other.as_mut().and_then(|other| other.poll(now)) {
+            return Some(self.report(None, Notice::HeartbeatLost(lost)));
+        }
         let armed = self.armed;
         let (axis, notice) = self
             .nodes
@@ -263,6 +274,11 @@ impl<const N: usize> Supervisor<N> {
         for consumer in watched.filter(|consumer| consumer.node() == node) {
             consumer.set_time(time);
         }
+    }
+
+    /// Watches a node that the network does not name, another NMT master for one.
+    pub fn watch(&mut self, other: Option<(NodeId, Duration)>) {
+        self.other = other.map(|(node, time)| Consumer::new(node, time));
     }
 
     fn report(&self, axis: Option<usize>, notice: Notice) -> Report {
@@ -379,6 +395,25 @@ mod tests {
         let frame = emcy.frame(NodeId::constant::<99>());
         let report = supervisor.on_frame(&frame, at(300)).unwrap();
         assert_eq!((report.axis, report.fault), (None, None));
+    }
+
+    #[test]
+    fn a_node_outside_the_network_is_watched_if_it_is_told_to() {
+        const OTHER: NodeId = NodeId::constant::<9>();
+        let mut supervisor = running();
+        let beat = ErrorControl::heartbeat(OTHER, State::Operational).frame();
+        assert_eq!(supervisor.on_frame(&beat, at(200)), None);
+        assert_eq!(supervisor.poll(at(400)), None);
+        supervisor.watch(Some((OTHER, Duration::from_millis(100))));
+        assert_eq!(supervisor.on_frame(&beat, at(300)), None);
+        assert_eq!(supervisor.poll(at(399)), None);
+        let lost = supervisor.poll(at(400)).unwrap();
+        assert_eq!((lost.axis, lost.fault), (None, None));
+        assert_eq!(lost.notice.node(), OTHER);
+        let back = supervisor.on_frame(&beat, at(410)).unwrap();
+        assert_eq!(back.notice, Notice::HeartbeatBack(OTHER));
+        supervisor.watch(None);
+        assert_eq!(supervisor.poll(at(440)), None);
     }
 
     #[test]

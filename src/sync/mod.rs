@@ -90,18 +90,27 @@ impl SyncCounter {
         self.last = 0;
     }
 
-    /// The next SYNC: a data frame, without data if there is no counter.
-    pub fn frame(&mut self, id: CobId) -> Frame {
+    /// What the next SYNC carries; `None`: no data.
+    #[inline]
+    pub fn count(&mut self) -> Option<u8> {
         if self.overflow == 0 {
-            return Frame::empty(id);
+            return None;
         }
         self.last = if self.last >= self.overflow {
             1
         } else {
             self.last + 1
         };
-        // One byte always fits.
-        Frame::data_frame(id, &[self.last]).unwrap_or(Frame::empty(id))
+        Some(self.last)
+    }
+
+    /// The next SYNC: a data frame, without data if there is no counter.
+    pub fn frame(&mut self, id: CobId) -> Frame {
+        match self.count() {
+            // One byte always fits.
+            Some(count) => Frame::data_frame(id, &[count]).unwrap_or(Frame::empty(id)),
+            None => Frame::empty(id),
+        }
     }
 }
 

@@ -37,7 +37,12 @@ impl Deadline {
             return false;
         }
         self.0.sr().write(|w| w.cc1if().clear_bit());
-        self.0.cnt().read().cnt().bits() >= self.0.ccr1().read().ccr().bits() as u16
+        self.elapsed_us() >= self.0.ccr1().read().ccr().bits() as u16
+    }
+
+    /// Microseconds since the period began.
+    pub fn elapsed_us(&self) -> u16 {
+        self.0.cnt().read().cnt().bits()
     }
 }
 

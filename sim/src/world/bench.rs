@@ -20,7 +20,12 @@ impl World<'_> {
                 self.decoder.restart();
                 self.board.hold_in_reset();
             }
-            Stimulus::Reset(false) => self.board.release_reset(),
+            Stimulus::Power(false) => {
+                self.watch.revoke();
+                self.decoder.restart();
+                self.board.power_off();
+            }
+            Stimulus::Reset(false) | Stimulus::Power(true) => self.board.release_reset(),
             Stimulus::Hang { irq } => self.board.hang_irq(irq),
             Stimulus::Spin { irq } => self.board.spin_irq(irq),
             Stimulus::DelayIrq { irq, max_cycles } => {

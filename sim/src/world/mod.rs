@@ -2,6 +2,7 @@
 //! the button.
 
 mod bench;
+mod client;
 mod guest;
 mod image;
 mod operator;
@@ -13,6 +14,7 @@ mod stimulus;
 pub mod trials;
 mod watch;
 
+pub use client::Client;
 pub use image::{Image, ImageError};
 pub use program::{assignment, network, round_trip, traffic};
 pub use record::{AxisRecord, Record};
@@ -24,7 +26,7 @@ use canmaster::nmt;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-use crate::board::{Board, BoardError, BoardOptions, FlashOptions, ResetCause};
+use crate::board::{Board, BoardError, BoardOptions, ResetCause};
 use crate::bridge::Bridge;
 use crate::bus::{BitTiming, Bus, Event, PortId, WireRecord};
 use crate::drive::{Drive, DriveConfig, DriveStatus, cia402};
@@ -104,7 +106,7 @@ impl<'i> World<'i> {
         let mut bus = Bus::new(scenario.seed);
         let mut ports = vec!["board".to_string()];
         let board_port = bus.attach(&ports[0]);
-        let board = Board::new(image.elf(), board_options(scenario.seed))?;
+        let board = Board::new(image.elf(), board_options(&scenario))?;
         let mut stations = Vec::new();
         for node in network().nodes {
             let present = !scenario.without.contains(&node.id);
@@ -268,17 +270,14 @@ impl<'i> World<'i> {
     }
 }
 
-/// The board that `seed` describes: its oscillators are a little off.
-fn board_options(seed: u64) -> BoardOptions {
-    let mut random = Pcg64Mcg::seed_from_u64(seed ^ BOARD_STREAM);
+/// The board that the seed describes: its oscillators are a little off.
+fn board_options(scenario: &Scenario) -> BoardOptions {
+    let mut random = Pcg64Mcg::seed_from_u64(scenario.seed ^ BOARD_STREAM);
     BoardOptions {
         clock_error_ppm: random.random_range(-CRYSTAL_PPM..=CRYSTAL_PPM),
         hsi_error_percent: random.random_range(-HSI_PERCENT..=HSI_PERCENT),
         lsi_error_percent: random.random_range(-LSI_PERCENT..=LSI_PERCENT),
-        flash: FlashOptions {
-            seed,
-            ..FlashOptions::default()
-        },
+        flash: scenario.flash.clone(),
         ..BoardOptions::default()
     }
 }

@@ -5,7 +5,9 @@ use std::collections::BTreeMap;
 use canmaster::NodeId;
 use canmaster::sdo::AbortCode;
 
+use super::network;
 use super::stimulus::Stimulus;
+use crate::board::{BankContents, FlashOptions};
 use crate::drive::{DriveFault, Identity};
 use crate::time::Time;
 
@@ -46,6 +48,8 @@ pub struct Scenario {
     pub in_motion: Vec<Stimulus>,
     /// Whether somebody presses the button as soon as the machine is ready.
     pub operated: bool,
+    /// Option bytes of the board's flash, and what its bank 2 holds.
+    pub flash: FlashOptions,
 }
 
 impl Scenario {
@@ -59,6 +63,10 @@ impl Scenario {
             stimuli: Vec::new(),
             in_motion: Vec::new(),
             operated: true,
+            flash: FlashOptions {
+                seed,
+                ..FlashOptions::default()
+            },
         }
     }
 
@@ -101,6 +109,18 @@ impl Scenario {
     /// The same with something done in full motion.
     pub fn in_motion(mut self, stimulus: Stimulus) -> Scenario {
         self.in_motion.push(stimulus);
+        self
+    }
+
+    /// The same with none of the drives.
+    pub fn without_drives(mut self) -> Scenario {
+        self.without = network().nodes.iter().map(|node| node.id).collect();
+        self
+    }
+
+    /// The same with what bank 2 of the board's flash holds.
+    pub fn stored(mut self, bank2: BankContents) -> Scenario {
+        self.flash.bank2 = Some(bank2);
         self
     }
 

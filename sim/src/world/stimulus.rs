@@ -15,6 +15,8 @@ pub enum Stimulus {
     Button(bool),
     /// The reset pin is pulled low, or let go.
     Reset(bool),
+    /// The supply of the board goes, or comes back.
+    Power(bool),
     /// An interrupt of the board is not taken any more, until its next reset.
     Hang {
         /// Its number.

@@ -46,6 +46,13 @@ impl Element {
         ]))
     }
 
+    /// From now on `data` is the only byte, or there is none.
+    #[inline(always)]
+    pub fn set_byte(&mut self, data: Option<u8>) {
+        self.0[1] = u32::from(data.is_some()) << DLC_SHIFT;
+        self.0[2] = u32::from(data.unwrap_or_default());
+    }
+
     pub(crate) const fn words(&self) -> &[u32; USED_WORDS] {
         &self.0
     }
