@@ -143,14 +143,14 @@ fn nmt_commands_from_the_bus_are_obeyed_while_no_axis_is_enabled() {
         client.take_heard();
         say_nmt(&mut client, command);
         client.listen(AWAKE);
-        assert_eq!(client.heard_from(HEARTBEAT)[0], [0]);
+        assert!(client.heard_from(HEARTBEAT).contains(&vec![0]));
         assert_eq!(client.number(0x1017, 0).unwrap(), 50);
     }
     // The same by 1F82h.
     client.put(0x1F82, 127, 7, 1).unwrap();
     client.take_heard();
     client.listen(AWAKE);
-    assert_eq!(client.heard_from(HEARTBEAT)[0], [0]);
+    assert!(client.heard_from(HEARTBEAT).contains(&vec![0]));
     client.put(0x1F82, 127, 4, 1).unwrap();
     client.listen(Time::from_ms(30));
     assert_eq!(state(&mut client), Some(0x04));
@@ -281,8 +281,12 @@ fn pdos_of_wrong_length_are_told() {
             "{len} bytes: {told:02X?}"
         );
     }
-    assert_eq!(client.number(0x1003, 1).unwrap(), 0x0204_8220);
-    assert_eq!(client.number(0x1003, 2).unwrap(), 0x0204_8210);
+    let field: Vec<u32> = (1..=8)
+        .filter_map(|sub| client.number(0x1003, sub).ok())
+        .collect();
+    for error in [0x0204_8210, 0x0204_8220] {
+        assert!(field.contains(&error), "{field:08X?}");
+    }
     // What was too short was left, what was too long was taken.
     assert_eq!(client.number(0x3004, 3).unwrap(), 0x0707_0707);
 }
