@@ -67,15 +67,12 @@ pub(crate) fn obey(
     orders: &mut Producer<'static, Order>,
     shared: &mut Shared<'_>,
 ) {
-    match *event {
-        Event::Changed(setting) => {
-            take_over(setting, own, period, shared);
-            own.orders(setting, |order| {
-                // There is room for the settings of all nodes.
-                let _ = orders.enqueue(order);
-            });
-        }
-        _ => {}
+    if let Event::Changed(setting) = *event {
+        take_over(setting, own, period, shared);
+        own.orders(setting, |order| {
+            // There is room for the settings of all nodes.
+            let _ = orders.enqueue(order);
+        });
     }
 }
 
