@@ -1,4 +1,4 @@
-//! Heartbeat consumer (CiA 301, 7.2.8.3.2.2, 7.5.2.15).
+//! Heartbeat consumer (CiA 301, 7.2.8.3.2.2, 7.5.2.19).
 
 use super::error_control::ErrorControl;
 use super::state::State;
@@ -97,7 +97,7 @@ impl Consumer {
     }
 
     /// Changes the consumer heartbeat time and starts anew
-    /// (CiA 301, 7.5.2.15).
+    /// (CiA 301, 7.5.2.19).
     pub fn set_time(&mut self, time: Duration) {
         self.time = time;
         self.reset();

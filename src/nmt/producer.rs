@@ -1,4 +1,4 @@
-//! Heartbeat producer (CiA 301, 7.2.8.3.2.2, 7.5.2.16).
+//! Heartbeat producer (CiA 301, 7.2.8.3.2.2, 7.5.2.20).
 
 use super::error_control::ErrorControl;
 use super::state::State;

@@ -1,4 +1,4 @@
-//! TIME: time of day on the bus (CiA 301, 7.2.6, 7.5.2.13).
+//! TIME: time of day on the bus (CiA 301, 7.2.6, 7.5.2.15).
 
 mod producer;
 
@@ -79,7 +79,7 @@ impl TimeOfDay {
     }
 }
 
-/// COB-ID of TIME, object 1012h (CiA 301, 7.5.2.13).
+/// COB-ID of TIME, object 1012h (CiA 301, 7.5.2.15).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct TimeCobId(pub u32);

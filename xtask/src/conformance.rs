@@ -30,10 +30,10 @@ pub(crate) fn check() -> Result<()> {
     for folder in SOURCES {
         collect(&root.join(folder), &mut files)?;
     }
-    let mut functions = BTreeSet::new();
+    let mut tests = BTreeSet::new();
     for file in &files {
         let text = fs::read_to_string(file).with_context(|| file.display().to_string())?;
-        functions.extend(function_names(&text).map(String::from));
+        tests.extend(test_names(&text).map(String::from));
     }
     let exists = |path: &str| {
         ROOTS.iter().any(|base| root.join(base).join(path).exists())
@@ -46,7 +46,7 @@ pub(crate) fn check() -> Result<()> {
             !(if is_path {
                 exists(name)
             } else {
-                functions.contains(*name)
+                tests.contains(*name)
             })
         })
         .map(|(line, name)| format!("{TABLE}:{line}: `{name}` does not exist"))
@@ -76,9 +76,14 @@ fn rows(table: &str) -> impl Iterator<Item = (usize, Vec<&str>)> {
     })
 }
 
-fn function_names(source: &str) -> impl Iterator<Item = &str> {
-    source.lines().filter_map(|line| {
+/// The functions that are tests: `#[test]` stands before them, with nothing but
+/// other attributes and comments between.
+fn test_names(source: &str) -> impl Iterator<Item = &str> {
+    let mut is_test = false;
+    source.lines().filter_map(move |line| {
+        is_test |= line.trim_start().starts_with("#[test]");
         let name = line.split_once("fn ")?.1;
+        std::mem::take(&mut is_test).then_some(())?;
         name.split(|c: char| !c.is_alphanumeric() && c != '_')
             .next()
     })
@@ -109,9 +114,9 @@ mod tests {
     }
 
     #[test]
-    fn functions_are_found_by_their_names() {
-        let source = "    fn one() {\n    pub(crate) const fn two<T>(x: T) {\n// none\n";
-        assert_eq!(function_names(source).collect::<Vec<_>>(), ["one", "two"]);
+    fn tests_are_found_by_their_names() {
+        let source = "#[test]\n/// Words.\n    fn one() {\nfn two<T>(x: T) {\n  #[test]\n  fn three(x in 0..2) {";
+        assert_eq!(test_names(source).collect::<Vec<_>>(), ["one", "three"]);
     }
 
     #[test]

@@ -209,7 +209,7 @@ impl Dictionary {
         Ok(())
     }
 
-    /// 1016h: a node is watched once (CiA 301, 7.5.2.14).
+    /// 1016h: a node is watched once (CiA 301, 7.5.2.19).
     fn check_consumer(&self, sub: u8, number: u32) -> Result<(), AbortCode> {
         let other = self.number(0x1016, if sub == 1 { 2 } else { 1 }) as u32;
         let (node, time) = (number >> 16 & 0xFF, number & 0xFFFF);

@@ -3,7 +3,8 @@
 
 use crate::time::Instant;
 
-/// The network has not begun, or has come to its end.
+/// The network has not begun, or has come to its end (CiA 302-2, "NMT
+/// start-up", before "Boot slave").
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Idle;
 
@@ -80,7 +81,8 @@ pub(super) struct Starting {
     pub(super) deadline: Instant,
 }
 
-/// It reports operational.
+/// It reports operational (CiA 302-2, "NMT start-up", its end; CiA 301,
+/// 7.2.8.3.2).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Operational;
 
