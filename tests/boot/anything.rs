@@ -75,9 +75,7 @@ const STATES: &[Place] = &[
         rig
     }),
     ("signature asked for", "state: Verify(", || {
-        let mut rig = Rig::with(network(2, |_| {}), |settings| {
-            settings.nodes[1].configured = [1, 2];
-        });
+        let mut rig = Rig::new(network(2, |node| node.configured = [1, 2]));
         rig.fakes[1].set((0x1020, 1), 7);
         rig.fakes[1].set((0x1020, 2), 7);
         rig.fakes[1].mute = Some((0x1020, 1));
