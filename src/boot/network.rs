@@ -12,6 +12,7 @@ use crate::id::{CobId, FunctionCode, NodeId};
 use crate::network::Network;
 use crate::nmt::ErrorControl;
 use crate::time::{Duration, Instant};
+use core::mem::MaybeUninit;
 use heapless::{Deque, Vec};
 
 /// Actions of the network itself that one stimulus can cause at most.
@@ -63,17 +64,44 @@ impl<const N: usize> NetworkBoot<N> {
         settings: &Settings<N>,
         now: Instant,
     ) -> NetworkBoot<N> {
+        let mut boot = NetworkBoot::without_nodes(network, settings, now);
+        boot.add_nodes(settings);
+        boot
+    }
+
+    /// As [`NetworkBoot::new`], made where it is to stay, without a copy on the
+    /// stack.
+    pub fn new_in<'a>(
+        place: &'a mut MaybeUninit<NetworkBoot<N>>,
+        network: &'static Network,
+        now: Instant,
+    ) -> &'a mut NetworkBoot<N> {
+        let settings = Settings::of(network);
+        let boot = place.write(NetworkBoot::without_nodes(network, &settings, now));
+        boot.add_nodes(&settings);
+        boot
+    }
+
+    fn add_nodes(&mut self, settings: &Settings<N>) {
+        for (node, settings) in self.network.nodes.iter().zip(&settings.nodes) {
+            // There is room: there are `N` settings.
+            let _ = self
+                .nodes
+                .push(NodeBoot::new(self.network, node, *settings));
+        }
+    }
+
+    fn without_nodes(
+        network: &'static Network,
+        settings: &Settings<N>,
+        now: Instant,
+    ) -> NetworkBoot<N> {
         let until = now + network.master.silence;
         NetworkBoot {
             network,
             startup: settings.startup,
             boot_time: settings.boot_time,
-            nodes: network
-                .nodes
-                .iter()
-                .zip(&settings.nodes)
-                .map(|(node, settings)| NodeBoot::new(network, node, *settings))
-                .collect(),
+            nodes: Vec::new(),
             phase: if settings.startup.has(Startup::MASTER) {
                 Phase::Silent { until }
             } else {

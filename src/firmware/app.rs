@@ -43,7 +43,7 @@ mod app {
             self, AxisMap, Debounce, ExtendedClock, MasterOd, Put, Reception, Supervisor,
             TPDOS_PER_AXIS, TpdoSlot, TxQueue,
         },
-        motion::{AxisCommand, GroupEvent, experiment},
+        motion::{AxisCommand, Group, GroupEvent, experiment},
         network::{Network, sample},
         nmt,
         time::{Duration, Instant},
@@ -121,6 +121,7 @@ mod app {
     /// Sets up the board and hands each task its part. Runs with interrupts off,
     /// before anything can be late.
     #[init(local = [
+        group_place: MaybeUninit<Group<AXES>> = MaybeUninit::uninit(),
         axes_place: MaybeUninit<Axes> = MaybeUninit::uninit(),
         boot_place: MaybeUninit<NetworkBoot<AXES>> = MaybeUninit::uninit(),
         own_place: MaybeUninit<OwnNode> = MaybeUninit::uninit(),
@@ -159,8 +160,8 @@ mod app {
         let (orders_to, orders) = cx.local.order_queue.split();
         let sync = defmt::unwrap!(can::Element::new(&Frame::empty(CobId::SYNC)));
         defmt::unwrap!(sdo_configurator::spawn().ok());
-        let own = place(cx.local.own_place, new_own_node);
-        let boot = place(cx.local.boot_place, new_boot);
+        let own = new_own_node(cx.local.own_place);
+        let boot = new_boot(cx.local.boot_place);
         let store = own.load(board.storage);
         boot.set_settings(&own.device.settings().boot());
         (
@@ -181,7 +182,7 @@ mod app {
                 answers_to,
                 requests_to,
                 deadline: board.deadline,
-                axes: place(cx.local.axes_place, new_axes),
+                axes: new_axes(cx.local.group_place, cx.local.axes_place),
                 events_to,
                 tick: board.tick,
                 microseconds: board.microseconds,
@@ -216,23 +217,27 @@ mod app {
         )
     }
 
-    /// Makes a large value where it is to stay. Not in `init` itself: what stands
-    /// in its frame lies below every interrupt's for ever.
+    /// Makes the largest values where they are to stay. Not in `init` itself: what
+    /// stands in its frame lies below every interrupt's for ever.
     #[inline(never)]
-    fn place<T>(place: &'static mut MaybeUninit<T>, new: fn() -> T) -> &'static mut T {
-        place.write(new())
+    fn new_axes(
+        group: &'static mut MaybeUninit<Group<AXES>>,
+        axes: &'static mut MaybeUninit<Axes>,
+    ) -> &'static mut Axes {
+        let group = Group::new_in(group, &experiment::GROUP);
+        axes.write(Axes::new(NETWORK, group))
     }
 
-    fn new_axes() -> Axes {
-        Axes::new(NETWORK, &experiment::GROUP)
+    #[inline(never)]
+    fn new_boot(
+        place: &'static mut MaybeUninit<NetworkBoot<AXES>>,
+    ) -> &'static mut NetworkBoot<AXES> {
+        NetworkBoot::new_in(place, NETWORK, Instant::ZERO)
     }
 
-    fn new_boot() -> NetworkBoot<AXES> {
-        NetworkBoot::new(NETWORK, Instant::ZERO)
-    }
-
-    fn new_own_node() -> OwnNode {
-        OwnNode::new(NETWORK)
+    #[inline(never)]
+    fn new_own_node(place: &'static mut MaybeUninit<OwnNode>) -> &'static mut OwnNode {
+        place.write(OwnNode::new(NETWORK))
     }
 
     /// Sleeps until the next interrupt.

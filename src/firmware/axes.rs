@@ -6,24 +6,24 @@ use canmaster::{
     cia402::StatusWord,
     design::AXES,
     master::{self, Cycle, Ramps, TpdoSlot},
-    motion::{AxisCommand, AxisFeedback, Group, GroupConfig, GroupEvent, GroupState, Request},
+    motion::{AxisCommand, AxisFeedback, Group, GroupEvent, GroupState, Request},
     network::Network,
 };
 
 /// The group with what surrounds it.
 pub(crate) struct Axes {
     network: &'static Network,
-    group: Group<AXES>,
+    group: &'static mut Group<AXES>,
     feedback: [AxisFeedback; AXES],
     commands: [AxisCommand; AXES],
     ramps: Ramps<AXES>,
 }
 
 impl Axes {
-    pub(crate) fn new(network: &'static Network, config: &'static GroupConfig<AXES>) -> Axes {
+    pub(crate) fn new(network: &'static Network, group: &'static mut Group<AXES>) -> Axes {
         Axes {
             network,
-            group: Group::new(config),
+            group,
             feedback: [AxisFeedback::default(); AXES],
             commands: [AxisCommand::default(); AXES],
             ramps: Ramps::new(),

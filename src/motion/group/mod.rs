@@ -23,7 +23,8 @@ mod watch;
 pub use config::{AxisConfig, GroupConfig};
 pub use event::{FaultCause, GroupEvent, GroupState, Refusal};
 
-use heapless::Deque;
+use core::mem::MaybeUninit;
+use heapless::{Deque, Vec};
 
 use self::axis::Axis;
 use super::profile::whole_cycles;
@@ -88,7 +89,8 @@ pub struct Request {
 /// `N` axes moved in step; see the module.
 pub struct Group<const N: usize> {
     config: &'static GroupConfig<N>,
-    axes: [Axis; N],
+    /// All `N`: a vector, so that they can be made one by one where they stay.
+    axes: Vec<Axis, N>,
     state: GroupState,
     now: Instant,
     /// Cycles since the references were set. They start at the SYNC after that,
@@ -110,9 +112,32 @@ impl<const N: usize> Group<N> {
     /// A group in [`GroupState::Idle`]. A program that breaks the limits is
     /// reported when it is released.
     pub fn new(config: &'static GroupConfig<N>) -> Group<N> {
+        let mut group = Group::without_axes(config);
+        group.add_axes();
+        group
+    }
+
+    /// The same, made where it is to stay, without a copy on the stack.
+    pub fn new_in<'a>(
+        place: &'a mut MaybeUninit<Group<N>>,
+        config: &'static GroupConfig<N>,
+    ) -> &'a mut Group<N> {
+        let group = place.write(Group::without_axes(config));
+        group.add_axes();
+        group
+    }
+
+    fn add_axes(&mut self) {
+        for axis in &self.config.axes {
+            // There is room: both are `N`.
+            let _ = self.axes.push(Axis::new(axis, self.config));
+        }
+    }
+
+    fn without_axes(config: &'static GroupConfig<N>) -> Group<N> {
         Group {
             config,
-            axes: config.axes.each_ref().map(|axis| Axis::new(axis, config)),
+            axes: Vec::new(),
             state: GroupState::Idle,
             now: Instant::ZERO,
             t: 0,
@@ -276,10 +301,10 @@ impl<const N: usize> Group<N> {
                 }
             }
             Some(Step::Move(moves)) => {
-                let from = self
-                    .axes
-                    .each_ref()
-                    .map(|a| a.reference.end().wrapping_sub(a.home));
+                let mut from = [0; N];
+                for (from, axis) in from.iter_mut().zip(&self.axes) {
+                    *from = axis.reference.end().wrapping_sub(axis.home);
+                }
                 let timings = program::plan(moves, &from, self.config)?;
                 for ((axis, part), timing) in self.axes.iter_mut().zip(moves).zip(timings) {
                     let start = axis.reference.end();
