@@ -10,7 +10,7 @@ use crate::emcy::{self, EmcyCobId};
 use crate::id::{Address, CobId, FunctionCode, NodeId};
 use crate::network::{self, Network, Node};
 use crate::nmt::{Command, NodeControl, State, Target};
-use crate::od::{Access, Chunk, DataType, Entry, Mappable, ObjectDictionary, Value, read_bytes};
+use crate::od::{Access, Chunk, DataType, Entry, ObjectDictionary, Value, read_bytes};
 use crate::pdo::Direction;
 use crate::sdo::AbortCode;
 use crate::store;
@@ -376,16 +376,12 @@ fn sdo_channel(sub: u8, server: NodeId) -> u32 {
 impl<B: Board, const N: usize> ObjectDictionary for View<'_, B, N> {
     fn entry(&self, at: Address) -> Result<Entry, AbortCode> {
         let found = self.dictionary.find(at)?;
-        let entry = Entry::new(found.data_type, found.access);
-        let process = match found.item {
-            Item::Process => self.dictionary.process(&found),
-            _ => None,
-        };
-        Ok(match process.map(|process| process.direction) {
-            None => entry,
-            Some(Direction::Transmit) => entry.mappable(Mappable::Rpdo),
-            Some(Direction::Receive) => entry.mappable(Mappable::Tpdo),
-        })
+        Ok(Entry::new(found.data_type, found.access))
+    }
+
+    /// The ranges of the settings are theirs to check.
+    fn in_range(&self, _: Address, _: Value) -> Result<(), AbortCode> {
+        Ok(())
     }
 
     fn get(&mut self, at: Address) -> Result<Value, AbortCode> {

@@ -53,6 +53,14 @@ pub trait ObjectDictionary {
     /// 06020000h if the object, 06090011h if the sub-index does not exist.
     fn entry(&self, at: Address) -> Result<Entry, AbortCode>;
 
+    /// Whether an entry takes a value, of the type that it has.
+    ///
+    /// # Errors
+    /// 06090030h if the value is out of the range that [`entry`](Self::entry) has.
+    fn in_range(&self, at: Address, value: Value) -> Result<(), AbortCode> {
+        self.entry(at)?.in_range(value)
+    }
+
     /// The value of an entry whose type has a fixed size. Access has been
     /// checked.
     ///

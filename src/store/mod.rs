@@ -25,10 +25,9 @@ pub const CAPACITY: usize = RECORD - 2 * WORD;
 const MAGIC: u16 = 0xC301;
 /// The bytes of erased flash.
 const ERASED: u8 = 0xFF;
-/// Room for the header, whose sequence number starts here.
-const SEQUENCE_AT: usize = 4;
-
-type Word = [u8; WORD];
+/// Where length and sequence number begin in the header.
+const LENGTH_AT: u32 = 16;
+const SEQUENCE_AT: u32 = 32;
 
 /// Why a set of settings was not stored or read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -156,11 +155,11 @@ impl<F: NorFlash> Store<F> {
         };
         let len = newest.len;
         let into = buf.get_mut(..len).ok_or(StoreError::Buffer { len })?;
-        let at = self.address(newest.page, newest.slot);
-        for (n, part) in into.chunks_mut(WORD).enumerate() {
-            let word = self.read(at + ((n + 1) * WORD) as u32);
-            let word = word.ok_or(StoreError::Flash)?;
-            for (to, from) in part.iter_mut().zip(word) {
+        let mut at = self.address(newest.page, newest.slot);
+        for part in into.chunks_mut(WORD) {
+            at += WORD as u32;
+            let word = self.read(at).ok_or(StoreError::Flash)?;
+            for (to, from) in part.iter_mut().zip(word.to_le_bytes()) {
                 *to = from;
             }
         }
@@ -238,61 +237,61 @@ impl<F: NorFlash> Store<F> {
     }
 
     fn write(&mut self, at: u32, sequence: u32, data: &[u8]) -> Result<(), StoreError> {
+        let words = data.len().div_ceil(WORD);
         let mut crc = Crc32::new();
-        let mut at = at;
-        let mut put = |word: Word| {
+        for n in 0..words + 2 {
+            let word = match n.checked_sub(1) {
+                None => header(data.len(), sequence).to_le_bytes(),
+                Some(n) if n == words => trailer(crc.value()).to_le_bytes(),
+                Some(n) => {
+                    let mut word = [ERASED; WORD];
+                    for (to, from) in word.iter_mut().zip(data.iter().skip(n * WORD)) {
+                        *to = *from;
+                    }
+                    word
+                }
+            };
             crc.update(&word);
-            let here = at;
-            at += WORD as u32;
-            self.flash.write(here, &word).map_err(flash_error)
-        };
-        put(header(data.len(), sequence))?;
-        for part in data.chunks(WORD) {
-            let mut word = [ERASED; WORD];
-            for (to, from) in word.iter_mut().zip(part) {
-                *to = *from;
-            }
-            put(word)?;
+            let at = at + (n * WORD) as u32;
+            self.flash.write(at, &word).map_err(flash_error)?;
         }
-        self.flash
-            .write(at, &trailer(crc.value()))
-            .map_err(flash_error)
+        Ok(())
     }
 
     /// The record in this place, if it is whole.
     fn check(&mut self, page: usize, slot: u32) -> Option<Newest> {
-        let at = self.address(page, slot);
+        let mut at = self.address(page, slot);
         let first = self.read(at)?;
-        let [m0, m1, l0, l1, rest @ ..] = first;
-        let len = usize::from(u16::from_le_bytes([l0, l1]));
-        if u16::from_le_bytes([m0, m1]) != MAGIC || len > CAPACITY {
+        let len = usize::from((first >> LENGTH_AT) as u16);
+        if first as u16 != MAGIC || len > CAPACITY {
             return None;
         }
         let mut crc = Crc32::new();
-        crc.update(&first);
-        let words = len.div_ceil(WORD);
-        for n in 1..=words {
-            crc.update(&self.read(at + (n * WORD) as u32)?);
+        crc.update(&first.to_le_bytes());
+        for _ in 0..len.div_ceil(WORD) {
+            at += WORD as u32;
+            crc.update(&self.read(at)?.to_le_bytes());
         }
-        let last = self.read(at + ((words + 1) * WORD) as u32)?;
+        let last = self.read(at + WORD as u32)?;
         (last == trailer(crc.value())).then_some(Newest {
             page,
             slot,
-            sequence: u32::from_le_bytes(rest),
+            sequence: (first >> SEQUENCE_AT) as u32,
             len,
         })
     }
 
     fn is_blank(&mut self, page: usize, slot: u32) -> bool {
+        const BLANK: u64 = u64::from_le_bytes([ERASED; WORD]);
         let at = self.address(page, slot);
-        (0..RECORD / WORD).all(|n| self.read(at + (n * WORD) as u32) == Some([ERASED; WORD]))
+        (0..RECORD / WORD).all(|n| self.read(at + (n * WORD) as u32) == Some(BLANK))
     }
 
     /// A word; `None` if it cannot be read, as one that a power cut tore.
-    fn read(&mut self, at: u32) -> Option<Word> {
+    fn read(&mut self, at: u32) -> Option<u64> {
         let mut word = [0; WORD];
         self.flash.read(at, &mut word).ok()?;
-        Some(word)
+        Some(u64::from_le_bytes(word))
     }
 
     fn address(&self, page: usize, slot: u32) -> u32 {
@@ -301,25 +300,14 @@ impl<F: NorFlash> Store<F> {
     }
 }
 
-fn header(len: usize, sequence: u32) -> Word {
-    let [m0, m1] = MAGIC.to_le_bytes();
-    let [l0, l1] = (len as u16).to_le_bytes();
-    let mut word = [m0, m1, l0, l1, 0, 0, 0, 0];
-    for (to, from) in word
-        .iter_mut()
-        .skip(SEQUENCE_AT)
-        .zip(sequence.to_le_bytes())
-    {
-        *to = from;
-    }
-    word
+const fn header(len: usize, sequence: u32) -> u64 {
+    MAGIC as u64 | (len as u64) << LENGTH_AT | (sequence as u64) << SEQUENCE_AT
 }
 
 /// The checksum and its complement: neither erased nor cleared flash looks like
 /// this.
-fn trailer(crc: u32) -> Word {
-    let both = u64::from(!crc) << u32::BITS | u64::from(crc);
-    both.to_le_bytes()
+const fn trailer(crc: u32) -> u64 {
+    (!crc as u64) << u32::BITS | crc as u64
 }
 
 fn flash_error<E: NorFlashError>(error: E) -> StoreError {

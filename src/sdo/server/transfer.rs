@@ -92,7 +92,7 @@ impl Sink {
         if last {
             let whole = self.value.get(..to).unwrap_or(&[]);
             let value = Value::from_bytes(self.data_type, whole)?;
-            od.entry(self.at)?.in_range(value)?;
+            od.in_range(self.at, value)?;
             od.set(self.at, value)?;
         }
         Ok(())
