@@ -160,6 +160,157 @@ fn every_object_has_its_size_and_access_in_every_state() {
     }
 }
 
+/// Where a client may write at all: objects, sub-indices.
+const WRITABLE: &[(std::ops::RangeInclusive<u16>, std::ops::RangeInclusive<u8>)] = &[
+    (0x1003..=0x1003, 0..=0),
+    (0x1005..=0x1007, 0..=0),
+    (0x1010..=0x1011, 1..=1),
+    (0x1012..=0x1012, 0..=0),
+    (0x1014..=0x1015, 0..=0),
+    (0x1016..=0x1016, 1..=6),
+    (0x1017..=0x1017, 0..=0),
+    (0x1019..=0x1019, 0..=0),
+    (0x1020..=0x1020, 1..=2),
+    (0x1029..=0x1029, 1..=1),
+    (0x1F25..=0x1F25, 1..=128),
+    (0x1F80..=0x1F80, 0..=0),
+    // Of the nodes that the network has.
+    (0x1F81..=0x1F81, 1..=6),
+    (0x1F82..=0x1F82, 1..=128),
+    (0x1F89..=0x1F89, 0..=0),
+    (0x2F10..=0x2F11, 0..=0),
+    (0x2F81..=0x2F86, 0..=0),
+];
+
+/// What follows from the design of the network is constant: 06010002h for every
+/// entry of the whole dictionary that is not named above, and for none that is.
+#[test]
+fn everything_else_is_constant() {
+    let mut b = Bench::new();
+    let mut constant = 0;
+    for index in 0x1000..=0x3100 {
+        for sub in 0..=255 {
+            let missing = [AbortCode::NO_SUCH_OBJECT, AbortCode::NO_SUCH_SUB_INDEX];
+            // A length that no entry has, so that nothing is changed.
+            let written = b.write(index, sub, &[0; 7]);
+            if written.is_err_and(|code| missing.contains(&code)) {
+                continue;
+            }
+            let writable = WRITABLE
+                .iter()
+                .any(|(objects, subs)| objects.contains(&index) && subs.contains(&sub));
+            let expected = if writable {
+                AbortCode::TOO_LONG
+            } else {
+                constant += 1;
+                AbortCode::READ_ONLY
+            };
+            assert_eq!(written, Err(expected), "{index:04X}h:{sub:02X}");
+        }
+    }
+    assert!(constant > 1000, "{constant} entries");
+    assert_eq!(b.events(), []);
+}
+
+/// Sub-index 0 of records and arrays: the last entry, as an UNSIGNED8.
+#[test]
+fn sub_index_0_names_the_last_entry() {
+    let mut b = Bench::new();
+    for (objects, last) in [
+        (0x1010..=0x1011, 1),
+        (0x1016..=0x1016, 6),
+        (0x1018..=0x1018, 4),
+        (0x1020..=0x1020, 2),
+        (0x1028..=0x1028, 127),
+        (0x1029..=0x1029, 1),
+        (0x1200..=0x1200, 2),
+        (0x1280..=0x1285, 3),
+        (0x1400..=0x140B, 2),
+        (0x1600..=0x160B, 2),
+        (0x1800..=0x180B, 2),
+        (0x1A00..=0x1A0B, 2),
+        (0x1F22..=0x1F22, 127),
+        (0x1F25..=0x1F25, 128),
+        (0x1F26..=0x1F27, 127),
+        (0x1F81..=0x1F81, 127),
+        (0x1F82..=0x1F82, 128),
+        (0x1F84..=0x1F88, 127),
+        (0x1F8A..=0x1F8A, 127),
+        (0x2F00..=0x2F02, 127),
+        (0x3001..=0x3006, 8),
+    ] {
+        for index in objects {
+            assert_eq!(b.read(index, 0), Ok(vec![last]), "{index:04X}h");
+        }
+    }
+}
+
+/// The edges of the ranges: what is taken and what is refused, each from the
+/// design's settings.
+#[test]
+fn edges_of_the_ranges() {
+    const TAKEN: Result<(), AbortCode> = Ok(());
+    const RANGE: Result<(), AbortCode> = Err(AbortCode::VALUE_RANGE);
+    const HIGH: Result<(), AbortCode> = Err(AbortCode::VALUE_TOO_HIGH);
+    const LOW: Result<(), AbortCode> = Err(AbortCode::VALUE_TOO_LOW);
+    for (index, sub, size, value, expected) in [
+        (0x1003, 0, 1, 0, TAKEN),
+        (0x1003, 0, 1, 255, RANGE),
+        (0x1005, 0, 4, 0x0000_0080, TAKEN),
+        (0x1005, 0, 4, 0x4000_0080, TAKEN),
+        (0x1005, 0, 4, 0x4000_0081, RANGE),
+        (0x1006, 0, 4, 0, TAKEN),
+        (0x1006, 0, 4, 999, LOW),
+        (0x1006, 0, 4, 1000, TAKEN),
+        (0x1006, 0, 4, 65_535, TAKEN),
+        (0x1006, 0, 4, 65_536, HIGH),
+        (0x1006, 0, 4, u32::MAX, HIGH),
+        (0x1007, 0, 4, 0, TAKEN),
+        (0x1007, 0, 4, 299, LOW),
+        (0x1007, 0, 4, 300, TAKEN),
+        (0x1007, 0, 4, 10_000, TAKEN),
+        (0x1007, 0, 4, 10_001, HIGH),
+        (0x1014, 0, 4, 0x0000_00FF, TAKEN),
+        (0x1014, 0, 4, 0x8000_00FF, TAKEN),
+        (0x1014, 0, 4, 0x4000_00FF, RANGE),
+        (0x1015, 0, 2, 0xFFFF, TAKEN),
+        (0x1016, 1, 4, 0x007F_FFFF, TAKEN),
+        (0x1016, 1, 4, 0x0100_0001, RANGE),
+        (0x1017, 0, 2, 0, TAKEN),
+        (0x1017, 0, 2, 0xFFFF, TAKEN),
+        (0x1029, 1, 1, 2, TAKEN),
+        (0x1029, 1, 1, 3, RANGE),
+        (0x1F80, 0, 4, 0x5F, TAKEN),
+        // Flying master is not offered.
+        (0x1F80, 0, 4, 0x21, RANGE),
+        (0x1F80, 0, 4, 0x80, RANGE),
+        (0x1F81, 1, 4, 0xFFFF_FF9D, TAKEN),
+        // Neither are check and update of the program.
+        (0x1F81, 1, 4, 0x25, RANGE),
+        (0x1F81, 1, 4, 0x45, RANGE),
+        (0x1F82, 1, 1, 128, RANGE),
+        (0x1F89, 0, 4, 0, TAKEN),
+        (0x1F89, 0, 4, u32::MAX, HIGH),
+        (0x2F81, 0, 1, 1, RANGE),
+    ] {
+        let mut b = Bench::new();
+        let data = &value.to_le_bytes()[..size];
+        let name = std::format!("{index:04X}h:{sub:02X} = {value:X}h");
+        assert_eq!(b.write(index, sub, data), expected, "{name}");
+        // One byte too many, and one too few.
+        let long = [data, &[0]].concat();
+        assert_eq!(
+            b.write(index, sub, &long),
+            Err(AbortCode::TOO_LONG),
+            "{name}"
+        );
+        if size > 1 {
+            let short = b.write(index, sub, &data[1..]);
+            assert_eq!(short, Err(AbortCode::TOO_SHORT), "{name}");
+        }
+    }
+}
+
 #[test]
 fn nothing_answers_where_sdo_is_not_allowed() {
     for state in [State::Initialising, State::Stopped] {

@@ -189,6 +189,80 @@ fn saving_is_refused_while_an_axis_is_enabled() {
     assert_eq!(b.number(0x1011, 1), Ok(1));
 }
 
+#[test]
+fn a_board_that_cannot_store_says_so() {
+    let mut b = Bench::new();
+    b.board.can_save = false;
+    for (index, signature) in [(0x1010, b"save"), (0x1011, b"load")] {
+        assert_eq!(b.number(index, 1), Ok(0));
+        assert_eq!(b.write(index, 1, signature), Err(AbortCode::DEVICE_STATE));
+    }
+    assert_eq!(b.board.saved, None);
+}
+
+/// 5530h, and it is over with the next save that succeeds.
+#[test]
+fn a_storage_that_fails_is_an_error_of_the_device() {
+    let mut b = Bench::new();
+    b.board.refuses = Some(AbortCode::HARDWARE);
+    assert_eq!(b.write(0x1010, 1, b"save"), Err(AbortCode::HARDWARE));
+    assert_eq!(b.number(0x1001, 0), Ok(1));
+    assert_eq!(b.number(0x1003, 1), Ok(0x5530));
+    let emcy = b.poll().unwrap();
+    assert_eq!(emcy.data(), [0x30, 0x55, 1, 0, 0, 0, 0, 0]);
+    b.board.refuses = None;
+    assert_eq!(b.write(0x1010, 1, b"save"), Ok(()));
+    assert_eq!(b.number(0x1001, 0), Ok(0));
+    assert_eq!(b.poll().unwrap().data(), [0; 8]);
+}
+
+/// A device whose settings say that it is not the NMT master.
+fn not_the_master() -> Bench {
+    let mut b = Bench::new();
+    b.write_u32(0x1F80, 0, 0).unwrap();
+    b.write(0x1010, 1, b"save").unwrap();
+    // The change of 1F80h, bit 0, has not taken effect yet.
+    assert!(b.device.is_master());
+    assert_eq!(b.write_u8(0x1F82, 1, 5), Ok(()));
+    let saved = b.board.saved.take().unwrap();
+    b.device.load(&saved, ms(0));
+    b.events();
+    b
+}
+
+#[test]
+fn who_is_not_the_nmt_master_commands_itself_alone() {
+    let mut b = not_the_master();
+    assert!(!b.device.is_master());
+    for sub in [1, 7, 128] {
+        let written = b.write_u8(0x1F82, sub, 5);
+        assert_eq!(written, Err(AbortCode::DEVICE_STATE), "{sub}");
+        let written = b.write(0x1F25, sub, b"conf");
+        assert_eq!(written, Err(AbortCode::DEVICE_STATE), "{sub}");
+    }
+    assert_eq!(b.events(), []);
+    assert_eq!(b.write_u8(0x1F82, 127, 4), Ok(()));
+    let stop = NodeControl::node(Command::Stop, node(127));
+    assert_eq!(b.events(), [Event::Nmt(stop)]);
+}
+
+/// The axes would be left without their master.
+#[test]
+fn the_device_itself_is_not_commanded_while_an_axis_is_enabled() {
+    let mut b = Bench::new();
+    b.device.set_axes_enabled(true);
+    for value in [4, 6, 7, 127] {
+        let written = b.write_u8(0x1F82, 127, value);
+        assert_eq!(written, Err(AbortCode::DEVICE_STATE), "{value}");
+        // The drives may be commanded: they come to rest by themselves.
+        assert_eq!(b.write_u8(0x1F82, 128, value), Ok(()));
+        b.events();
+    }
+    assert_eq!(b.write_u8(0x1F82, 127, 5), Ok(()));
+    b.enter(State::Operational);
+    assert_eq!(b.number(0x1F82, 127), Ok(5));
+}
+
 /// What a tool can change, each in its own way.
 const CHANGES: &[(u16, u8, &[u8])] = &[
     (0x1006, 0, &[0, 0, 0, 0]),
