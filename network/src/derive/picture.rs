@@ -1,0 +1,51 @@
+//! A cycle as a line of text.
+
+use crate::layout::{Layout, SlotKind};
+
+/// Letters of the picture and what they stand for.
+const LETTERS: [(SlotKind, char, &str); 7] = [
+    (SlotKind::Sync, 'S', "SYNC"),
+    (SlotKind::Latency, '.', "drives answer"),
+    (SlotKind::Tpdo, 'T', "TPDOs"),
+    (SlotKind::Other, 'o', "heartbeats, SDO"),
+    (SlotKind::Compute, 'c', "master computes"),
+    (SlotKind::Rpdo, 'R', "RPDOs"),
+    (SlotKind::Guard, '|', "guard"),
+];
+
+const NS_PER_US: u64 = 1000;
+
+/// The cycle to scale in `width` letters, and what they mean. What does not fit
+/// into the cycle is left out; the guard stands at its end.
+pub fn picture(layout: &Layout, width: usize) -> String {
+    let cycle_ns = u64::from(layout.cycle_us.max(1)) * NS_PER_US;
+    let column = |ns: u64| (ns.min(cycle_ns) * width as u64 / cycle_ns) as usize;
+    let mut line = vec![' '; width];
+    for slot in &layout.slots {
+        let Some((_, letter, _)) = LETTERS.iter().find(|(kind, ..)| *kind == slot.kind) else {
+            continue;
+        };
+        let (start, end) = match slot.kind {
+            SlotKind::Guard => (cycle_ns.saturating_sub(slot.length_ns), cycle_ns),
+            _ => (slot.start_ns, slot.start_ns + slot.length_ns),
+        };
+        let first = column(start);
+        // Even the shortest is seen.
+        let last = column(end).max(first + usize::from(slot.length_ns > 0));
+        for place in line.iter_mut().take(last).skip(first) {
+            *place = *letter;
+        }
+    }
+    let line: String = line.into_iter().collect();
+    let legend: Vec<String> = LETTERS
+        .iter()
+        .filter(|(kind, ..)| {
+            layout
+                .slots
+                .iter()
+                .any(|s| s.kind == *kind && s.length_ns > 0)
+        })
+        .map(|(_, letter, what)| format!("{letter} {what}"))
+        .collect();
+    format!("[{line}]\n {}", legend.join("   "))
+}

@@ -1,0 +1,179 @@
+//! The constants of the firmware, as Rust.
+
+use std::fmt::Write;
+
+use crate::model::{Identity, Machine, Node, Pdo};
+use crate::object::Address;
+
+/// The description of the first bus as constants of the library that `library`
+/// names: `crate` within it, `canmaster` outside.
+///
+/// Everything is `const` or `static` without interior mutability, so that it
+/// lies in flash.
+pub fn rust(machine: &Machine, library: &str) -> String {
+    let mut out = String::new();
+    // Writing into a string cannot fail.
+    let _ = write(machine, library, &mut out);
+    out
+}
+
+fn write(machine: &Machine, library: &str, out: &mut String) -> std::fmt::Result {
+    let Some(bus) = machine.buses.first() else {
+        return Ok(());
+    };
+    let master = &machine.master;
+    writeln!(out, "// Made from network.toml; changes here are lost.\n")?;
+    writeln!(out, "use {library}::id::NodeId;")?;
+    writeln!(
+        out,
+        "use {library}::network::{{Identity, Master, Network, Node}};"
+    )?;
+    writeln!(out, "use {library}::time::Duration;\n")?;
+    writeln!(out, "/// Axes of the group.")?;
+    writeln!(out, "pub const AXES: usize = {};", machine.nodes.len())?;
+    writeln!(
+        out,
+        "/// When the PDO producer goes ahead without the TPDOs that are missing, us."
+    )?;
+    writeln!(
+        out,
+        "pub const TPDO_DEADLINE_US: u32 = {};",
+        bus.tpdo_deadline_us
+    )?;
+    writeln!(
+        out,
+        "/// Cycles in a row without a TPDO after which its node counts as lost."
+    )?;
+    writeln!(
+        out,
+        "pub const TPDO_MISSING_LIMIT: u8 = {};",
+        machine.missing_tpdos
+    )?;
+    writeln!(
+        out,
+        "/// The shortest SYNC period (1006h) that the cycle's frames fit into, us."
+    )?;
+    let shortest = bus.layout.demand.smallest_cycle().unwrap_or(bus.cycle_us);
+    writeln!(out, "pub const SHORTEST_CYCLE_US: u32 = {shortest};")?;
+    writeln!(
+        out,
+        "/// Prescaler, segment 1 and segment 2 of the bit timing."
+    )?;
+    let t = bus.timing;
+    writeln!(
+        out,
+        "pub const BIT_TIMING: (u16, u16, u16) = ({}, {}, {});\n",
+        t.prescaler, t.seg1, t.seg2
+    )?;
+    writeln!(out, "/// The bus \"{}\".", bus.name.escape_default())?;
+    writeln!(out, "pub static NETWORK: Network = Network {{")?;
+    writeln!(out, "    bit_rate: {},", bus.bit_rate)?;
+    writeln!(out, "    cycle: Duration::from_micros({}),", bus.cycle_us)?;
+    writeln!(out, "    master: Master {{")?;
+    writeln!(
+        out,
+        "        node: NodeId::constant::<{}>(),",
+        master.node_id
+    )?;
+    for (name, ms) in [
+        ("heartbeat", u32::from(master.heartbeat_ms)),
+        ("silence", master.silence_ms),
+        ("boot_time", master.boot_time_ms),
+    ] {
+        writeln!(out, "        {name}: Duration::from_millis({ms}),")?;
+    }
+    writeln!(out, "        sdo_tries: {},", master.sdo_tries)?;
+    writeln!(
+        out,
+        "        syncs_before_start: {},",
+        master.syncs_before_start
+    )?;
+    writeln!(out, "    }},\n    nodes: &[")?;
+    for described in &machine.nodes {
+        node(described, library, out)?;
+    }
+    writeln!(out, "    ],\n}};")
+}
+
+fn node(node: &Node, library: &str, out: &mut String) -> std::fmt::Result {
+    writeln!(out, "        Node {{")?;
+    writeln!(out, "            id: NodeId::constant::<{}>(),", node.id)?;
+    writeln!(out, "            name: \"{}\",", node.name.escape_default())?;
+    writeln!(out, "            mandatory: {},", node.mandatory)?;
+    let Identity {
+        device_type,
+        vendor,
+        product,
+        revision,
+        serial,
+    } = node.identity;
+    writeln!(out, "            identity: Identity {{")?;
+    for (name, value) in [
+        ("device_type", device_type),
+        ("vendor", vendor),
+        ("product", product),
+        ("revision", revision),
+        ("serial", serial),
+    ] {
+        match value {
+            Some(value) => writeln!(out, "                {name}: Some(0x{value:08X}),")?,
+            None => writeln!(out, "                {name}: None,")?,
+        }
+    }
+    writeln!(out, "            }},")?;
+    writeln!(out, "            heartbeat_ms: {},", node.heartbeat_ms)?;
+    writeln!(out, "            consumer_ms: {},", node.master_timeout_ms)?;
+    pdos("rpdos", &node.rpdos, library, out)?;
+    pdos("tpdos", &node.tpdos, library, out)?;
+    writeln!(out, "            start_values: &[")?;
+    for write in &node.start_values {
+        writeln!(
+            out,
+            "                {library}::network::ConfigWrite::u{}({}, 0x{:X}),",
+            u32::from(write.bytes) * u8::BITS,
+            address(write.at, library),
+            write.value
+        )?;
+    }
+    writeln!(out, "            ],")?;
+    let timeout = node.sdo_timeout_ms;
+    writeln!(
+        out,
+        "            sdo_timeout: Duration::from_millis({timeout}),"
+    )?;
+    let [date, time] = node.configured;
+    writeln!(
+        out,
+        "            configured: [{date}, {time}],\n        }},"
+    )
+}
+
+fn pdos(name: &str, pdos: &[Pdo], library: &str, out: &mut String) -> std::fmt::Result {
+    writeln!(out, "            {name}: &[")?;
+    for pdo in pdos {
+        writeln!(out, "                {library}::network::Pdo {{")?;
+        writeln!(out, "                    number: {},", pdo.number)?;
+        writeln!(
+            out,
+            "                    transmission: {library}::pdo::Transmission::from_code({}),",
+            pdo.transmission
+        )?;
+        writeln!(out, "                    mapping: &[")?;
+        for entry in &pdo.mapping {
+            writeln!(
+                out,
+                "                        {library}::pdo::MappingEntry::new(0x{:04X}, {}, {}),",
+                entry.at.index, entry.at.sub, entry.bits
+            )?;
+        }
+        writeln!(out, "                    ],\n                }},")?;
+    }
+    writeln!(out, "            ],")
+}
+
+fn address(at: Address, library: &str) -> String {
+    format!(
+        "{library}::id::Address::new(0x{:04X}, {})",
+        at.index, at.sub
+    )
+}

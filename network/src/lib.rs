@@ -1,0 +1,94 @@
+//! A machine is described once, in `network.toml`, beside the EDS files of its
+//! devices. This reads the description, looks everything up, refuses what cannot
+//! work with the line that is wrong, and derives the rest: the firmware's
+//! constants, the concise DCF of each node, a DBC.
+//!
+//! The crate knows nothing of the firmware and nothing of the library that the
+//! firmware is made of, so that the firmware's build script can use it.
+
+mod check;
+pub mod derive;
+mod description;
+pub mod eds;
+pub mod frame;
+pub mod layout;
+pub mod model;
+pub mod object;
+pub mod plan;
+mod problem;
+mod resolve;
+pub mod s1;
+mod source;
+pub mod timing;
+
+pub use problem::{Problem, Severity};
+pub use source::Source;
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use description::Description;
+use model::Machine;
+use problem::{Place, Problems};
+
+/// What came of reading a description.
+#[derive(Debug)]
+#[non_exhaustive]
+pub struct Outcome {
+    /// The machine, if there is no error.
+    pub machine: Option<Machine>,
+    /// Everything that is wrong, in the order in which it was found.
+    pub problems: Vec<Problem>,
+    /// The names of all files that were read or looked for: a build depends on
+    /// them.
+    pub files: Vec<String>,
+}
+
+/// Reads and checks the description at `path`.
+pub fn load(path: &Path) -> Outcome {
+    let name = path.display().to_string();
+    match std::fs::read(path) {
+        Ok(bytes) => read(&Source::new(name, &bytes), &mut |file| std::fs::read(file)),
+        Err(error) => {
+            let source = Source::new(&name, b"");
+            let mut problems = Problems::default();
+            problems.error(
+                &Place::file(&source),
+                &name,
+                format!("the file cannot be read: {error}"),
+                "give the path of a network.toml; `cargo xtask new DIR` makes one",
+            );
+            Outcome {
+                machine: None,
+                problems: problems.into_vec(),
+                files: vec![name],
+            }
+        }
+    }
+}
+
+/// The same from memory: `open` gives the bytes of the files that the description
+/// names, relative to its own folder.
+pub fn read(source: &Source, open: &mut dyn FnMut(&Path) -> io::Result<Vec<u8>>) -> Outcome {
+    let mut problems = Problems::default();
+    let mut files = vec![source.name().to_string()];
+    let folder = Path::new(source.name())
+        .parent()
+        .map_or_else(PathBuf::new, Path::to_path_buf);
+    let mut open = |name: &str| {
+        let path = folder.join(name);
+        // The same words on every system.
+        let shown = path.display().to_string().replace('\\', "/");
+        files.push(shown.clone());
+        open(&path).map(|bytes| Source::new(shown, &bytes))
+    };
+    let machine = Description::read(source, &mut problems).and_then(|description| {
+        let machine = resolve::machine(&description, source, &mut open, &mut problems);
+        machine.filter(|_| !problems.has_errors())
+    });
+    Outcome {
+        machine,
+        problems: problems.into_vec(),
+        files,
+    }
+}

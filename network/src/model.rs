@@ -1,0 +1,179 @@
+//! The machine after everything was looked up and checked.
+
+use crate::layout::Layout;
+use crate::object::{Address, DataType, Direction};
+use crate::timing::BitTiming;
+
+/// A machine: the master, and its nodes on one bus or several.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Machine {
+    /// The master's own parameters.
+    pub master: Master,
+    /// The buses, by name.
+    pub buses: Vec<Bus>,
+    /// Cycles in a row without a TPDO after which its node counts as lost.
+    pub missing_tpdos: u8,
+    /// The nodes, in the order of the axes.
+    pub nodes: Vec<Node>,
+}
+
+/// `[master]`
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Master {
+    /// Its node-ID.
+    pub node_id: u8,
+    /// 1017h
+    pub heartbeat_ms: u16,
+    /// Silence after a reset.
+    pub silence_ms: u32,
+    /// 1F89h
+    pub boot_time_ms: u32,
+    /// How often a request is tried.
+    pub sdo_tries: u8,
+    /// SYNCs before NMT start.
+    pub syncs_before_start: u8,
+}
+
+/// `[bus.NAME]`
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Bus {
+    /// Its name.
+    pub name: String,
+    /// Which FDCAN: 1 ..= 3.
+    pub peripheral: u8,
+    /// bit/s
+    pub bit_rate: u32,
+    /// How the controller makes a bit.
+    pub timing: BitTiming,
+    /// 1006h
+    pub cycle_us: u32,
+    /// When the master goes on without the TPDOs that are missing, after SYNC.
+    pub tpdo_deadline_us: u32,
+    /// The cycle, slot by slot.
+    pub layout: Layout,
+}
+
+/// `[[node]]`, with what its device says.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Node {
+    /// Its node-ID.
+    pub id: u8,
+    /// What people call it.
+    pub name: String,
+    /// The place of its bus in [`Machine::buses`].
+    pub bus: usize,
+    /// Without it the network does not start.
+    pub mandatory: bool,
+    /// What it must be.
+    pub identity: Identity,
+    /// 1017h of the node.
+    pub heartbeat_ms: u16,
+    /// 1016h of the node: how long it waits for the master.
+    pub master_timeout_ms: u16,
+    /// How long its SDO server may take.
+    pub sdo_timeout_ms: u32,
+    /// 1020h:1 and 1020h:2 of a node that is configured already; 0 and 0: it is
+    /// configured at every boot-up.
+    pub configured: [u32; 2],
+    /// From SYNC to its request to send TPDOs, at worst.
+    pub tpdo_latency_us: u32,
+    /// RPDOs in use, by number.
+    pub rpdos: Vec<Pdo>,
+    /// TPDOs in use, by number.
+    pub tpdos: Vec<Pdo>,
+    /// Increments of the encoder for a turn of the motor.
+    pub increments_per_turn: Option<u32>,
+    /// Turns of the motor for turns of the load.
+    pub gear: (u32, u32),
+    /// Start values in their order.
+    pub start_values: Vec<Write>,
+}
+
+/// Expected identity; `None` is not checked.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Identity {
+    /// 1000h
+    pub device_type: Option<u32>,
+    /// 1018h:1
+    pub vendor: Option<u32>,
+    /// 1018h:2
+    pub product: Option<u32>,
+    /// 1018h:3
+    pub revision: Option<u32>,
+    /// 1018h:4
+    pub serial: Option<u32>,
+}
+
+/// A PDO in use.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Pdo {
+    /// Seen from the node.
+    pub direction: Direction,
+    /// 1 ..= 4
+    pub number: u8,
+    /// Transmission type.
+    pub transmission: u8,
+    /// What it carries.
+    pub mapping: Vec<Mapped>,
+}
+
+impl Pdo {
+    /// Its identifier at a node (CiA 301, 7.3.5).
+    pub fn cob_id(&self, node: u8) -> u16 {
+        self.direction.function_code(self.number) + u16::from(node)
+    }
+
+    /// Its length in whole bytes.
+    pub fn bytes(&self) -> u8 {
+        let bits: u32 = self.mapping.iter().map(|entry| u32::from(entry.bits)).sum();
+        bits.div_ceil(u8::BITS) as u8
+    }
+}
+
+/// One object in a PDO.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Mapped {
+    /// The object.
+    pub at: Address,
+    /// Its name in the EDS.
+    pub name: String,
+    /// Its type.
+    pub data_type: DataType,
+    /// Its length.
+    pub bits: u8,
+}
+
+impl Mapped {
+    /// As the mapping parameter has it (CiA 301, 7.5.2.36).
+    pub fn word(&self) -> u32 {
+        u32::from(self.at.index) << 16 | u32::from(self.at.sub) << 8 | u32::from(self.bits)
+    }
+}
+
+/// One write of a configuration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Write {
+    /// Where.
+    pub at: Address,
+    /// The value's bits; those above `bytes` are 0.
+    pub value: u32,
+    /// 1, 2 or 4
+    pub bytes: u8,
+}
+
+impl Write {
+    /// A value of so many bytes; what lies above them is cut off.
+    pub fn new(at: Address, value: i128, bytes: u8) -> Write {
+        let mask = u64::MAX >> (u64::BITS - u32::from(bytes) * u8::BITS);
+        Write {
+            at,
+            value: (value as u64 & mask) as u32,
+            bytes,
+        }
+    }
+}

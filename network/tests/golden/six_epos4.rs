@@ -1,0 +1,398 @@
+// Made from network.toml; changes here are lost.
+
+use canmaster::id::NodeId;
+use canmaster::network::{Identity, Master, Network, Node};
+use canmaster::time::Duration;
+
+/// Axes of the group.
+pub const AXES: usize = 6;
+/// When the PDO producer goes ahead without the TPDOs that are missing, us.
+pub const TPDO_DEADLINE_US: u32 = 5000;
+/// Cycles in a row without a TPDO after which its node counts as lost.
+pub const TPDO_MISSING_LIMIT: u8 = 3;
+/// The shortest SYNC period (1006h) that the cycle's frames fit into, us.
+pub const SHORTEST_CYCLE_US: u32 = 5000;
+/// Prescaler, segment 1 and segment 2 of the bit timing.
+pub const BIT_TIMING: (u16, u16, u16) = (1, 20, 3);
+
+/// The bus "main".
+pub static NETWORK: Network = Network {
+    bit_rate: 1000000,
+    cycle: Duration::from_micros(10000),
+    master: Master {
+        node: NodeId::constant::<127>(),
+        heartbeat: Duration::from_millis(50),
+        silence: Duration::from_millis(600),
+        boot_time: Duration::from_millis(1500),
+        sdo_tries: 3,
+        syncs_before_start: 2,
+    },
+    nodes: &[
+        Node {
+            id: NodeId::constant::<1>(),
+            name: "axis 1",
+            mandatory: true,
+            identity: Identity {
+                device_type: Some(0x00020192),
+                vendor: Some(0x000000FB),
+                product: Some(0x61500000),
+                revision: Some(0x01700000),
+                serial: None,
+            },
+            heartbeat_ms: 100,
+            consumer_ms: 200,
+            rpdos: &[
+                canmaster::network::Pdo {
+                    number: 1,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
+                        canmaster::pdo::MappingEntry::new(0x60FF, 0, 32),
+                    ],
+                },
+                canmaster::network::Pdo {
+                    number: 2,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x6083, 0, 32),
+                        canmaster::pdo::MappingEntry::new(0x6084, 0, 32),
+                    ],
+                },
+            ],
+            tpdos: &[
+                canmaster::network::Pdo {
+                    number: 1,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x6041, 0, 16),
+                        canmaster::pdo::MappingEntry::new(0x6064, 0, 32),
+                    ],
+                },
+                canmaster::network::Pdo {
+                    number: 2,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x606C, 0, 32),
+                        canmaster::pdo::MappingEntry::new(0x6077, 0, 16),
+                    ],
+                },
+            ],
+            start_values: &[
+                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x6060, 0), 0x3),
+                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x60C2, 1), 0xA),
+                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x607F, 0), 0xBB8),
+                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x6080, 0), 0xBB8),
+                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x60C5, 0), 0x4E20),
+                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x6085, 0), 0x2710),
+                canmaster::network::ConfigWrite::u16(canmaster::id::Address::new(0x6007, 0), 0x3),
+            ],
+            sdo_timeout: Duration::from_millis(100),
+            configured: [0, 0],
+        },
+        Node {
+            id: NodeId::constant::<2>(),
+            name: "axis 2",
+            mandatory: true,
+            identity: Identity {
+                device_type: Some(0x00020192),
+                vendor: Some(0x000000FB),
+                product: Some(0x61500000),
+                revision: Some(0x01700000),
+                serial: None,
+            },
+            heartbeat_ms: 100,
+            consumer_ms: 200,
+            rpdos: &[
+                canmaster::network::Pdo {
+                    number: 1,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
+                        canmaster::pdo::MappingEntry::new(0x60FF, 0, 32),
+                    ],
+                },
+                canmaster::network::Pdo {
+                    number: 2,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x6083, 0, 32),
+                        canmaster::pdo::MappingEntry::new(0x6084, 0, 32),
+                    ],
+                },
+            ],
+            tpdos: &[
+                canmaster::network::Pdo {
+                    number: 1,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x6041, 0, 16),
+                        canmaster::pdo::MappingEntry::new(0x6064, 0, 32),
+                    ],
+                },
+                canmaster::network::Pdo {
+                    number: 2,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x606C, 0, 32),
+                        canmaster::pdo::MappingEntry::new(0x6077, 0, 16),
+                    ],
+                },
+            ],
+            start_values: &[
+                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x6060, 0), 0x3),
+                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x60C2, 1), 0xA),
+                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x607F, 0), 0xBB8),
+                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x6080, 0), 0xBB8),
+                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x60C5, 0), 0x4E20),
+                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x6085, 0), 0x2710),
+                canmaster::network::ConfigWrite::u16(canmaster::id::Address::new(0x6007, 0), 0x3),
+            ],
+            sdo_timeout: Duration::from_millis(100),
+            configured: [0, 0],
+        },
+        Node {
+            id: NodeId::constant::<3>(),
+            name: "axis 3",
+            mandatory: true,
+            identity: Identity {
+                device_type: Some(0x00020192),
+                vendor: Some(0x000000FB),
+                product: Some(0x61500000),
+                revision: Some(0x01700000),
+                serial: None,
+            },
+            heartbeat_ms: 100,
+            consumer_ms: 200,
+            rpdos: &[
+                canmaster::network::Pdo {
+                    number: 1,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
+                        canmaster::pdo::MappingEntry::new(0x60FF, 0, 32),
+                    ],
+                },
+                canmaster::network::Pdo {
+                    number: 2,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x6083, 0, 32),
+                        canmaster::pdo::MappingEntry::new(0x6084, 0, 32),
+                    ],
+                },
+            ],
+            tpdos: &[
+                canmaster::network::Pdo {
+                    number: 1,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x6041, 0, 16),
+                        canmaster::pdo::MappingEntry::new(0x6064, 0, 32),
+                    ],
+                },
+                canmaster::network::Pdo {
+                    number: 2,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x606C, 0, 32),
+                        canmaster::pdo::MappingEntry::new(0x6077, 0, 16),
+                    ],
+                },
+            ],
+            start_values: &[
+                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x6060, 0), 0x3),
+                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x60C2, 1), 0xA),
+                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x607F, 0), 0xBB8),
+                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x6080, 0), 0xBB8),
+                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x60C5, 0), 0x4E20),
+                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x6085, 0), 0x2710),
+                canmaster::network::ConfigWrite::u16(canmaster::id::Address::new(0x6007, 0), 0x3),
+            ],
+            sdo_timeout: Duration::from_millis(100),
+            configured: [0, 0],
+        },
+        Node {
+            id: NodeId::constant::<4>(),
+            name: "axis 4",
+            mandatory: true,
+            identity: Identity {
+                device_type: Some(0x00020192),
+                vendor: Some(0x000000FB),
+                product: Some(0x61500000),
+                revision: Some(0x01700000),
+                serial: None,
+            },
+            heartbeat_ms: 100,
+            consumer_ms: 200,
+            rpdos: &[
+                canmaster::network::Pdo {
+                    number: 1,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
+                        canmaster::pdo::MappingEntry::new(0x60FF, 0, 32),
+                    ],
+                },
+                canmaster::network::Pdo {
+                    number: 2,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x6083, 0, 32),
+                        canmaster::pdo::MappingEntry::new(0x6084, 0, 32),
+                    ],
+                },
+            ],
+            tpdos: &[
+                canmaster::network::Pdo {
+                    number: 1,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x6041, 0, 16),
+                        canmaster::pdo::MappingEntry::new(0x6064, 0, 32),
+                    ],
+                },
+                canmaster::network::Pdo {
+                    number: 2,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x606C, 0, 32),
+                        canmaster::pdo::MappingEntry::new(0x6077, 0, 16),
+                    ],
+                },
+            ],
+            start_values: &[
+                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x6060, 0), 0x3),
+                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x60C2, 1), 0xA),
+                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x607F, 0), 0xBB8),
+                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x6080, 0), 0xBB8),
+                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x60C5, 0), 0x4E20),
+                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x6085, 0), 0x2710),
+                canmaster::network::ConfigWrite::u16(canmaster::id::Address::new(0x6007, 0), 0x3),
+            ],
+            sdo_timeout: Duration::from_millis(100),
+            configured: [0, 0],
+        },
+        Node {
+            id: NodeId::constant::<5>(),
+            name: "axis 5",
+            mandatory: true,
+            identity: Identity {
+                device_type: Some(0x00020192),
+                vendor: Some(0x000000FB),
+                product: Some(0x61500000),
+                revision: Some(0x01700000),
+                serial: None,
+            },
+            heartbeat_ms: 100,
+            consumer_ms: 200,
+            rpdos: &[
+                canmaster::network::Pdo {
+                    number: 1,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
+                        canmaster::pdo::MappingEntry::new(0x60FF, 0, 32),
+                    ],
+                },
+                canmaster::network::Pdo {
+                    number: 2,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x6083, 0, 32),
+                        canmaster::pdo::MappingEntry::new(0x6084, 0, 32),
+                    ],
+                },
+            ],
+            tpdos: &[
+                canmaster::network::Pdo {
+                    number: 1,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x6041, 0, 16),
+                        canmaster::pdo::MappingEntry::new(0x6064, 0, 32),
+                    ],
+                },
+                canmaster::network::Pdo {
+                    number: 2,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x606C, 0, 32),
+                        canmaster::pdo::MappingEntry::new(0x6077, 0, 16),
+                    ],
+                },
+            ],
+            start_values: &[
+                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x6060, 0), 0x3),
+                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x60C2, 1), 0xA),
+                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x607F, 0), 0xBB8),
+                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x6080, 0), 0xBB8),
+                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x60C5, 0), 0x4E20),
+                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x6085, 0), 0x2710),
+                canmaster::network::ConfigWrite::u16(canmaster::id::Address::new(0x6007, 0), 0x3),
+            ],
+            sdo_timeout: Duration::from_millis(100),
+            configured: [0, 0],
+        },
+        Node {
+            id: NodeId::constant::<6>(),
+            name: "axis 6",
+            mandatory: true,
+            identity: Identity {
+                device_type: Some(0x00020192),
+                vendor: Some(0x000000FB),
+                product: Some(0x61500000),
+                revision: Some(0x01700000),
+                serial: None,
+            },
+            heartbeat_ms: 100,
+            consumer_ms: 200,
+            rpdos: &[
+                canmaster::network::Pdo {
+                    number: 1,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
+                        canmaster::pdo::MappingEntry::new(0x60FF, 0, 32),
+                    ],
+                },
+                canmaster::network::Pdo {
+                    number: 2,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x6083, 0, 32),
+                        canmaster::pdo::MappingEntry::new(0x6084, 0, 32),
+                    ],
+                },
+            ],
+            tpdos: &[
+                canmaster::network::Pdo {
+                    number: 1,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x6041, 0, 16),
+                        canmaster::pdo::MappingEntry::new(0x6064, 0, 32),
+                    ],
+                },
+                canmaster::network::Pdo {
+                    number: 2,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x606C, 0, 32),
+                        canmaster::pdo::MappingEntry::new(0x6077, 0, 16),
+                    ],
+                },
+            ],
+            start_values: &[
+                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x6060, 0), 0x3),
+                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x60C2, 1), 0xA),
+                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x607F, 0), 0xBB8),
+                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x6080, 0), 0xBB8),
+                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x60C5, 0), 0x4E20),
+                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x6085, 0), 0x2710),
+                canmaster::network::ConfigWrite::u16(canmaster::id::Address::new(0x6007, 0), 0x3),
+            ],
+            sdo_timeout: Duration::from_millis(100),
+            configured: [0, 0],
+        },
+    ],
+};
