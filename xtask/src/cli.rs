@@ -64,6 +64,12 @@ pub(crate) enum Command {
     Flash,
     /// Show the log of a board that is running already
     Attach,
+    /// Check the description of the machine and lay out its cycle
+    Check(CheckOptions),
+    /// Start a machine of your own from the sample
+    New(NewOptions),
+    /// How many nodes can be updated in 0.1 s, by SDO and by PDO
+    Capacity(CapacityOptions),
     /// The tests with CANopen tools that are not ours: wants Python 3
     Interop,
     /// Everything that has to pass: format, lints, tests, sizes, a run, other
@@ -124,6 +130,27 @@ pub(crate) struct CiOptions {
 
 #[derive(Args, Clone, Debug)]
 pub(crate) struct SizeOptions {
+    /// One JSON object on standard output and nothing else there
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Args, Clone, Debug)]
+pub(crate) struct CheckOptions {
+    /// The description [default: network.toml of this project]
+    #[arg(value_name = "FILE")]
+    pub(crate) file: Option<PathBuf>,
+}
+
+#[derive(Args, Clone, Debug)]
+pub(crate) struct NewOptions {
+    /// The folder to make
+    #[arg(value_name = "DIR")]
+    pub(crate) dir: PathBuf,
+}
+
+#[derive(Args, Clone, Debug)]
+pub(crate) struct CapacityOptions {
     /// One JSON object on standard output and nothing else there
     #[arg(long)]
     pub(crate) json: bool,

@@ -2,13 +2,16 @@
 
 mod attach;
 mod campaign;
+mod capacity;
 mod cargo;
+mod check;
 mod ci;
 mod cli;
 mod conformance;
 mod firmware;
 mod image;
 mod interop;
+mod new;
 mod report;
 mod run;
 mod size;
@@ -28,6 +31,9 @@ fn main() -> ExitCode {
         Command::Size(options) => size::command(&options),
         Command::Flash => attach::flash(),
         Command::Attach => attach::attach(),
+        Command::Check(options) => check::command(&options),
+        Command::New(options) => new::command(&options),
+        Command::Capacity(options) => capacity::command(&options),
         Command::Interop => interop::command(),
         Command::Ci(options) => ci::command(&options),
         Command::Campaign(options) => campaign::command(&options),

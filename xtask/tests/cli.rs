@@ -23,6 +23,8 @@ fn bad_input_ends_with_usage_and_exit_code_two() {
         &["run", "--fault", "3:loud"],
         &["campaign", "--seeds", "0"],
         &["size", "now"],
+        &["new"],
+        &["capacity", "--fast"],
         &["fly"],
         &[],
     ] {
@@ -31,6 +33,53 @@ fn bad_input_ends_with_usage_and_exit_code_two() {
         assert!(words.contains("usage"), "{bad:?}: {words}");
         assert!(assert.get_output().stdout.is_empty(), "{bad:?}");
     }
+}
+
+#[test]
+fn the_sample_is_checked_and_its_files_are_derived() {
+    let assert = xtask().arg("check").assert().code(0);
+    let words = String::from_utf8_lossy(&assert.get_output().stdout).into_owned();
+    assert!(words.contains("the smallest cycle that fits"), "{words}");
+    assert!(words.contains("6 nodes, 0 warnings"), "{words}");
+}
+
+#[test]
+fn a_machine_from_the_sample_is_all_right_until_it_is_broken() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path().join("mine");
+    xtask().arg("new").arg(&dir).assert().code(0);
+    let file = dir.join("network.toml");
+    xtask().arg("check").arg(&file).assert().code(0);
+    let assert = xtask().arg("new").arg(&dir).assert().code(1);
+    let words = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
+    assert!(words.contains("exists already"), "{words}");
+
+    let text = std::fs::read_to_string(&file).unwrap();
+    std::fs::write(&file, text.replace("Target velocity", "Target velocty")).unwrap();
+    let assert = xtask().arg("check").arg(&file).assert().code(1);
+    let words = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
+    assert!(
+        words.contains("did you mean \"Target velocity\""),
+        "{words}"
+    );
+}
+
+#[test]
+fn capacity_prints_one_json_object_with_the_table_of_the_paper() {
+    let assert = xtask().args(["capacity", "--json"]).assert().code(0);
+    let object: Value = serde_json::from_slice(&assert.get_output().stdout).unwrap();
+    let column = |name: &str| -> Vec<u64> {
+        let rows = object["rows"].as_array().unwrap();
+        rows.iter().map(|row| row[name].as_u64().unwrap()).collect()
+    };
+    assert_eq!(column("sdo_paper"), [11, 10, 10, 8, 6, 5, 3, 1, 1]);
+    assert_eq!(column("pdo_paper"), [127, 127, 127, 99, 49, 39, 19, 7, 3]);
+    assert_eq!(
+        column("pdo_paper_uncapped"),
+        [399, 319, 199, 99, 49, 39, 19, 7, 3]
+    );
+    assert_eq!(column("pdo_exact_uncapped"), column("pdo_paper_uncapped"));
+    assert_eq!(column("bitrate")[0], 1_000_000);
 }
 
 #[test]

@@ -1,0 +1,156 @@
+//! `cargo xtask check`: whether a machine can work, and what follows from it.
+
+use std::fs;
+use std::path::Path;
+use std::process::ExitCode;
+
+use anyhow::{Context, Result};
+use canmaster_network::derive::{concise_dcf, dbc, picture};
+use canmaster_network::layout::{Layout, SlotKind};
+use canmaster_network::model::{Bus, Machine};
+use canmaster_network::{Severity, load};
+
+use crate::cargo;
+use crate::cli::CheckOptions;
+use crate::table;
+
+/// The description of this project.
+pub(crate) const DESCRIPTION: &str = "network.toml";
+/// Letters of the picture of a cycle.
+const WIDTH: usize = 72;
+const NS_PER_US: u64 = 1000;
+const PER_MILLE_TO_PERCENT: u32 = 10;
+
+/// Rows of the table of a cycle.
+const ROWS: [(SlotKind, &str); 7] = [
+    (SlotKind::Sync, "SYNC"),
+    (SlotKind::Latency, "drives answer"),
+    (SlotKind::Tpdo, "TPDOs"),
+    (SlotKind::Other, "heartbeats, SDO"),
+    (SlotKind::Compute, "master computes"),
+    (SlotKind::Rpdo, "RPDOs"),
+    (SlotKind::Guard, "guard"),
+];
+
+/// `cargo xtask check`.
+pub(crate) fn command(options: &CheckOptions) -> Result<ExitCode> {
+    let workspace = cargo::workspace();
+    let path = match &options.file {
+        Some(file) => file.clone(),
+        // Named as a user in the project's folder names it.
+        None if Path::new(DESCRIPTION).exists() => DESCRIPTION.into(),
+        None => workspace.join(DESCRIPTION),
+    };
+    let outcome = load(&path);
+    for problem in &outcome.problems {
+        eprintln!("{problem}\n");
+    }
+    let count = |severity| {
+        outcome
+            .problems
+            .iter()
+            .filter(|p| p.severity == severity)
+            .count()
+    };
+    let Some(machine) = outcome.machine else {
+        eprintln!(
+            "{}: refused, {} errors",
+            path.display(),
+            count(Severity::Error)
+        );
+        return Ok(ExitCode::FAILURE);
+    };
+    for bus in &machine.buses {
+        show(bus);
+    }
+    let folder = workspace.join("target").join("network");
+    derived(&machine, &folder)?;
+    println!(
+        "{}: {} nodes, {} warnings; derived files are in {}",
+        path.display(),
+        machine.nodes.len(),
+        count(Severity::Warning),
+        folder.display()
+    );
+    Ok(ExitCode::SUCCESS)
+}
+
+fn show(bus: &Bus) {
+    let layout = &bus.layout;
+    println!(
+        "bus \"{}\": FDCAN{}, {} bit/s, sample point {}.{} %, cycle {} us",
+        bus.name,
+        bus.peripheral,
+        bus.bit_rate,
+        bus.timing.sample_point() / PER_MILLE_TO_PERCENT,
+        bus.timing.sample_point() % PER_MILLE_TO_PERCENT,
+        bus.cycle_us
+    );
+    let mut cycle = table::new(&[
+        "slot",
+        "frames",
+        "bits at worst",
+        "us at worst",
+        "ends at us",
+    ]);
+    for (kind, name) in ROWS {
+        let slots: Vec<_> = layout
+            .slots
+            .iter()
+            .filter(|slot| slot.kind == kind)
+            .collect();
+        let frames = slots.iter().filter(|slot| slot.bits > 0).count();
+        let bits: u32 = slots.iter().map(|slot| slot.bits).sum();
+        let us = slots
+            .iter()
+            .map(|slot| slot.length_ns)
+            .sum::<u64>()
+            .div_ceil(NS_PER_US);
+        cycle.add_row([
+            name.to_string(),
+            frames.to_string(),
+            bits.to_string(),
+            us.to_string(),
+            layout.end_us(kind).to_string(),
+        ]);
+    }
+    table::align_right(&mut cycle, &[1, 2, 3, 4]);
+    println!("{cycle}\n{}", picture(layout, WIDTH));
+    println!("{}\n", summary(layout));
+}
+
+fn summary(layout: &Layout) -> String {
+    let percent = |per_mille: u32| {
+        let (whole, tenth) = (
+            per_mille / PER_MILLE_TO_PERCENT,
+            per_mille % PER_MILLE_TO_PERCENT,
+        );
+        format!("{whole}.{tenth} %")
+    };
+    let smallest = match layout.demand.smallest_cycle() {
+        Some(us) => format!("the smallest cycle that fits is {us} us"),
+        None => "no cycle fits".to_string(),
+    };
+    format!(
+        "load at worst {} of the cycle (limit {}); {smallest}",
+        percent(layout.load()),
+        percent(layout.demand.load_limit)
+    )
+}
+
+/// Writes what follows from the machine.
+fn derived(machine: &Machine, folder: &Path) -> Result<()> {
+    let write = |name: String, bytes: &[u8]| {
+        let path = folder.join(name);
+        fs::write(&path, bytes).with_context(|| path.display().to_string())
+    };
+    fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    for (place, bus) in machine.buses.iter().enumerate() {
+        write(format!("{}.dbc", bus.name), dbc(machine, place).as_bytes())?;
+    }
+    for node in &machine.nodes {
+        let bytes = concise_dcf(&machine.master, node);
+        write(format!("node-{}.dcf.bin", node.id), &bytes)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,43 @@
+//! `cargo xtask new`: a machine of the user's own, from the sample.
+
+use std::fs;
+use std::process::ExitCode;
+
+use anyhow::{Context, Result, bail};
+
+use crate::cargo;
+use crate::check::DESCRIPTION;
+use crate::cli::NewOptions;
+
+/// What the sample is made of, relative to the workspace.
+const FILES: [&str; 3] = [
+    DESCRIPTION,
+    "eds/maxon-epos4.eds",
+    "docs/network.schema.json",
+];
+
+/// `cargo xtask new`.
+pub(crate) fn command(options: &NewOptions) -> Result<ExitCode> {
+    let workspace = cargo::workspace();
+    let description = options.dir.join(DESCRIPTION);
+    if description.exists() {
+        bail!(
+            "{} exists already; name a new folder, or remove the file first",
+            description.display()
+        );
+    }
+    for file in FILES {
+        let to = options.dir.join(file);
+        if let Some(folder) = to.parent() {
+            fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+        }
+        fs::copy(workspace.join(file), &to).with_context(|| to.display().to_string())?;
+    }
+    println!(
+        "{} is a machine like the sample. Change it, and let it be checked with\n\n    \
+         cargo xtask check {}",
+        options.dir.display(),
+        description.display()
+    );
+    Ok(ExitCode::SUCCESS)
+}
