@@ -11,16 +11,18 @@ use crate::cargo;
 
 const TABLE: &str = "docs/conformance.md";
 /// Where modules and tests are.
-const SOURCES: [&str; 6] = [
+const SOURCES: [&str; 8] = [
     "src",
     "tests",
     "sim/src",
     "sim/tests",
+    "network/src",
+    "network/tests",
     "xtask/src",
     "boards",
 ];
 /// What the paths in the table are relative to.
-const ROOTS: [&str; 3] = ["src", "sim/src", ""];
+const ROOTS: [&str; 4] = ["src", "sim/src", "network/src", ""];
 
 /// Every module and every test of the table exists.
 pub(crate) fn check() -> Result<()> {
