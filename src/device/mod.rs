@@ -6,7 +6,7 @@
 //! | 1000h .. 1003h | device type, error register, status register, error field | ro; 1003h:00 takes 0 |
 //! | 1005h, 1006h, 1007h, 1019h | SYNC | rw in pre-operational, else 08000022h |
 //! | 1008h .. 100Ah, 1018h | names, versions, identity | const |
-//! | 1010h, 1011h | "save", "load"; 08000022h while an axis is enabled | rw |
+//! | 1010h, 1011h | "save", "load"; 08000022h while an axis is enabled, or if the board cannot store, when they read as 0 | rw |
 //! | 1012h | TIME | rw |
 //! | 1014h .. 1017h | emergencies, heartbeats | rw |
 //! | 1020h, 1029h | verify configuration, error behaviour | rw |
@@ -16,7 +16,7 @@
 //! | 1F25h | "conf": configure a node again | wo |
 //! | 1F26h, 1F27h, 1F84h .. 1F88h, 1F8Ah | what each node has to be | const |
 //! | 1F80h, 1F81h, 1F89h | NMT start-up, slave assignment, boot time | rw |
-//! | 1F82h | request NMT; reads what the node last said | rw |
+//! | 1F82h | request NMT; reads what the node last said; of the device itself 08000022h while an axis is enabled | rw |
 //! | 2F00h:n | error status of the boot-up of node n: a letter of CiA 302-2, 0 for none | ro, U8 |
 //! | 2F01h:n | boot-up of node n in words | ro, string |
 //! | 2F02h:n | newest emergency of node n in words | ro, string |
