@@ -52,6 +52,9 @@ fn a_missing_drive_ends_the_run_within_three_seconds() {
     assert_failed(&record, &["node 4"]);
     assert_nothing_moved(&record);
     assert!(record.simulated <= Time::from_s(3), "{}", record.simulated);
+    // Had it no node-ID, it would have been found: all to waiting, anybody?
+    let lss = record.lss.unwrap();
+    assert_eq!((lss.requests, lss.answers), (2, 0));
 }
 
 #[test]

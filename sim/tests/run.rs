@@ -51,6 +51,7 @@ fn assert_good(record: &Record) {
     assert_eq!(record.board.rx_overruns, [0; 3]);
     assert!(record.complaints.is_empty(), "{:?}", record.complaints);
     assert_eq!(record.bus.error_frames, 0);
+    assert_eq!(record.lss, None, "everybody has a node-ID");
 }
 
 #[test]

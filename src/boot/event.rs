@@ -79,7 +79,8 @@ pub enum Event {
     },
     /// The controller is restarted; the silent phase begins.
     BusRestarted,
-    /// Nodes without node-ID are looked for (CiA 305, fastscan).
+    /// A node did not boot; it is looked for among those without node-ID
+    /// (CiA 305, fastscan).
     Scanning,
     /// The node with the serial number that the network names was given its
     /// node-ID.
@@ -157,7 +158,7 @@ in_words!(Event {
     Event::NetworkStopped => ("all nodes stopped after the error of a mandatory node"),
     Event::BusOff { pause_ms } => ("bus-off: restarting the controller in {} ms", pause_ms),
     Event::BusRestarted => ("controller restarted, silent until the drives are at rest"),
-    Event::Scanning => ("looking for nodes without node-ID"),
+    Event::Scanning => ("not every node booted: looking for nodes without node-ID (LSS)"),
     Event::IdGiven { node, stored: true } => ("node {}: found by its serial number, node-ID given", node),
     Event::IdGiven { node, stored: false } => (
         "node {}: found by its serial number, node-ID given, but the node does not store it", node

@@ -7,7 +7,8 @@
 
 use super::event::{Action, Event};
 use crate::frame::Frame;
-use crate::lss::{Answer, ConfigurationResult, Fastscan, Mode, Request, ScanPart, Verdict};
+use crate::id::CobId;
+use crate::lss::{Awaited, ConfigurationResult, Fastscan, Mode, Request, Verdict};
 use crate::network::Node;
 use crate::time::{Duration, Instant};
 
@@ -20,14 +21,14 @@ const ANSWER_TIMEOUT: Duration = Duration::from_millis(500);
 enum Step {
     /// All nodes to waiting; a node that was given a node-ID boots with it.
     Leave,
+    /// Who is looked for next? When all were, anybody else.
+    Next,
     /// Is the node there? It is selected if it is.
     Scan,
     /// Its node-ID.
     Give,
     /// For the next power-on.
     Store,
-    /// Is there anybody else?
-    Strangers,
     /// Nothing is left to be found.
     Over,
 }
@@ -41,11 +42,10 @@ pub(super) struct Factory {
     scan: Fastscan,
     /// Somebody answered to the question that is out.
     yes: bool,
-    /// The node looked for.
+    /// The node looked for; behind the last one: anybody else.
     place: usize,
-    given: bool,
     /// What [`Step::Leave`] leads to.
-    over: bool,
+    after: Step,
 }
 
 impl Factory {
@@ -53,153 +53,139 @@ impl Factory {
         Factory {
             step: Step::Leave,
             asked: None,
-            scan: Fastscan::new([ScanPart::Unknown; 4]),
+            scan: Fastscan::new([None; 4]),
             yes: false,
             place: 0,
-            given: false,
-            over: false,
+            after: Step::Next,
         }
     }
 
-    /// `Some` at the end: whether any node was given a node-ID.
-    pub(super) const fn finished(&self) -> Option<bool> {
-        match self.step {
-            Step::Over => Some(self.given),
-            _ => None,
-        }
+    /// Nobody is looked for any more.
+    pub(super) const fn is_over(&self) -> bool {
+        matches!(self.step, Step::Over)
     }
 
     pub(super) const fn next_deadline(&self) -> Option<Instant> {
         self.asked
     }
 
-    /// Takes in the answer of an LSS slave.
-    pub(super) fn on_frame(&mut self, frame: &Frame, nodes: &'static [Node]) -> Option<Action> {
-        match (self.step, Answer::decode(frame)?) {
+    /// Takes in the answer of an LSS slave. Not inlined, here and below: the three
+    /// stay small by themselves.
+    #[inline(never)]
+    pub(super) fn on_frame(&mut self, frame: &Frame, nodes: &'static [Node]) -> Option<Event> {
+        let awaited = match self.step {
+            Step::Scan => Awaited::Identified,
+            Step::Give => Awaited::NodeId,
+            Step::Store => Awaited::Store,
+            _ => return None,
+        };
+        let result = ConfigurationResult::decode(frame, awaited)?;
+        if matches!(awaited, Awaited::Identified) {
             // Several nodes may answer, each in its own time: the next question
             // waits until all have had theirs.
-            (Step::Scan | Step::Strangers, Answer::Identified) => {
-                self.yes = true;
-                None
-            }
-            (Step::Give, Answer::NodeId(result)) | (Step::Store, Answer::Store(result)) => {
-                self.configured(Some(result), nodes)
-            }
-            _ => None,
+            self.yes = true;
+            return None;
         }
+        self.settle(Some(result), nodes)
     }
 
     /// The next thing to do. `wanted` tells which nodes are looked for.
+    #[inline(never)]
     pub(super) fn poll(
         &mut self,
         now: Instant,
         nodes: &'static [Node],
         wanted: impl Fn(usize) -> bool,
     ) -> Option<Action> {
-        if let Some(until) = self.asked {
-            if now < until {
-                return None;
-            }
-            let action = self.time_is_over(now, nodes);
-            if action.is_some() || self.asked.is_some() {
-                return action;
-            }
+        if self.asked.is_some_and(|until| now < until) {
+            return None;
         }
-        if matches!(self.step, Step::Scan) {
-            match (self.place..nodes.len()).find(|place| wanted(*place)) {
-                Some(place) => self.place = place,
-                None => self.step = Step::Strangers,
-            }
+        if self.asked.is_some()
+            && let Some(event) = self.settle(None, nodes)
+        {
+            return Some(Action::Report(event));
         }
-        let node = nodes.get(self.place);
-        let (request, time) = match self.step {
-            Step::Leave => (Request::SwitchGlobal(Mode::Waiting), Duration::ZERO),
-            Step::Scan | Step::Strangers => {
-                let known = node.filter(|_| matches!(self.step, Step::Scan)).map(parts);
-                self.scan = Fastscan::new(known.unwrap_or([ScanPart::Unknown; 4]));
-                (self.scan.question(), SCAN_TIMEOUT)
-            }
-            Step::Give => (Request::NodeId(Some(node?.id)), ANSWER_TIMEOUT),
-            Step::Store => (Request::Store, ANSWER_TIMEOUT),
-            Step::Over => return None,
-        };
-        Some(self.ask(request, now + time))
-    }
-
-    fn ask(&mut self, request: Request, until: Instant) -> Action {
-        self.asked = Some(until);
-        self.yes = false;
-        Action::Send(request.frame())
-    }
-
-    fn time_is_over(&mut self, now: Instant, nodes: &'static [Node]) -> Option<Action> {
-        let strangers = match self.step {
-            Step::Scan => false,
-            Step::Strangers => true,
-            Step::Leave => {
-                self.enter(if self.over { Step::Over } else { Step::Scan });
-                return None;
-            }
-            _ => return self.configured(None, nodes),
-        };
-        match self.scan.answer(self.yes) {
-            Verdict::Continue => {
-                let question = self.scan.question();
-                return Some(self.ask(question, now + SCAN_TIMEOUT));
-            }
-            Verdict::Found(address) if strangers => {
-                self.over = true;
-                self.enter(Step::Leave);
-                return Some(Action::Report(Event::Stranger(address)));
-            }
-            Verdict::Found(_) => self.enter(Step::Give),
-            Verdict::Lost(_) if !strangers => {
-                // It is not among them.
+        if matches!(self.step, Step::Next) {
+            while self.place < nodes.len() && !wanted(self.place) {
                 self.place += 1;
-                self.enter(Step::Scan);
             }
-            Verdict::Lost(_) | Verdict::Nobody => self.enter(Step::Over),
+            self.scan = Fastscan::new(nodes.get(self.place).map_or([None; 4], named));
+            self.step = Step::Scan;
         }
-        None
+        let (bytes, time) = match self.step {
+            Step::Leave => (Request::SwitchGlobal(Mode::Waiting).bytes(), Duration::ZERO),
+            Step::Scan => (self.scan.question().bytes(), SCAN_TIMEOUT),
+            Step::Give => {
+                let node = nodes.get(self.place).map(|node| node.id);
+                (Request::NodeId(node).bytes(), ANSWER_TIMEOUT)
+            }
+            Step::Store => (Request::Store.bytes(), ANSWER_TIMEOUT),
+            Step::Next | Step::Over => return None,
+        };
+        self.asked = Some(now + time);
+        self.yes = false;
+        Some(Action::Send(Frame::full(CobId::LSS_MASTER, bytes)))
     }
 
-    /// What came of giving or storing a node-ID; `None` if there was no answer.
-    fn configured(
+    /// The request that is out has had its time, or its answer.
+    #[inline(never)]
+    fn settle(
         &mut self,
         result: Option<ConfigurationResult>,
         nodes: &'static [Node],
-    ) -> Option<Action> {
-        let node = nodes.get(self.place)?.id;
+    ) -> Option<Event> {
+        self.asked = None;
+        let node = nodes.get(self.place).map(|node| node.id);
         let ok = result.is_some_and(ConfigurationResult::is_ok);
-        let event = match (self.step, result) {
-            (Step::Give, _) if ok => {
-                self.enter(Step::Store);
+        let event = match (self.step, node) {
+            (Step::Leave, _) => {
+                self.step = self.after;
                 return None;
             }
-            (Step::Give, Some(ConfigurationResult { error, specific })) => Event::IdRefused {
-                node,
-                error,
-                specific,
+            (Step::Scan, node) => match (self.scan.answer(self.yes), node) {
+                (Verdict::Continue, _) => return None,
+                (Verdict::Found(_), Some(_)) => {
+                    self.step = Step::Give;
+                    return None;
+                }
+                (Verdict::Found(address), None) => {
+                    self.after = Step::Over;
+                    Event::Stranger(address)
+                }
+                // It is not among them.
+                (Verdict::Lost(_), Some(_)) => {
+                    self.place += 1;
+                    self.step = Step::Next;
+                    return None;
+                }
+                _ => {
+                    self.step = Step::Over;
+                    return None;
+                }
             },
-            (Step::Give, None) => Event::IdUnanswered(node),
-            _ => {
-                self.given = true;
-                Event::IdGiven { node, stored: ok }
-            }
+            (Step::Give, Some(node)) => match result {
+                Some(_) if ok => {
+                    self.step = Step::Store;
+                    return None;
+                }
+                Some(ConfigurationResult { error, specific }) => Event::IdRefused {
+                    node,
+                    error,
+                    specific,
+                },
+                None => Event::IdUnanswered(node),
+            },
+            (Step::Store, Some(node)) => Event::IdGiven { node, stored: ok },
+            _ => return None,
         };
         self.place += 1;
-        self.enter(Step::Leave);
-        Some(Action::Report(event))
-    }
-
-    const fn enter(&mut self, step: Step) {
-        self.step = step;
-        self.asked = None;
+        self.step = Step::Leave;
+        Some(event)
     }
 }
 
-/// What the network names is confirmed, the rest is found out bit by bit.
-fn parts(node: &Node) -> [ScanPart; 4] {
+/// The numbers of the LSS address that the network names.
+fn named(node: &Node) -> [Option<u32>; 4] {
     let identity = &node.identity;
     [
         identity.vendor,
@@ -207,5 +193,4 @@ fn parts(node: &Node) -> [ScanPart; 4] {
         identity.revision,
         identity.serial,
     ]
-    .map(|number| number.map_or(ScanPart::Unknown, ScanPart::Known))
 }

@@ -7,6 +7,12 @@
 //! be (1F84h .. 1F88h), what is written to it (1F22h) and when it need not be
 //! (1F26h, 1F27h) comes from the description of the network.
 //!
+//! LSS is required (CiA 302-2, "NMT start-up") where a node that the network
+//! names by its serial number did not boot within 1F89h: before it is given up,
+//! it is looked for among the nodes without node-ID (CiA 305, fastscan), given its
+//! node-ID, and booted. That is done once. Where every node boots, no LSS frame is
+//! sent; where nobody is without node-ID, one question is.
+//!
 //! Where the standard leaves room, or motion wants more than it asks for:
 //! - Nodes are started only when every mandatory one is booted, one by one too.
 //! - NMT start goes by broadcast (1F80h, bit 1) only if all nodes wait for it.

@@ -36,10 +36,8 @@ pub struct NetworkBoot<const N: usize> {
     pub(super) ran: bool,
     /// The application ordered the start that 1F80h, bit 2, leaves to it.
     pub(super) ordered: bool,
-    /// Nodes without node-ID are looked for before the nodes are reset.
-    pub(super) scan_first: bool,
-    /// They were looked for.
-    pub(super) scanned: bool,
+    /// Nodes without node-ID were or are looked for.
+    pub(super) searched: bool,
     pub(super) factory: Factory,
     /// Where bus-off leads back to, if the network was halted before.
     pub(super) halted: Option<Phase>,
@@ -110,8 +108,7 @@ impl<const N: usize> NetworkBoot<N> {
             ready: false,
             ran: false,
             ordered: false,
-            scan_first: false,
-            scanned: false,
+            searched: false,
             factory: Factory::new(),
             halted: None,
             pauses: Pauses::new(),
@@ -132,13 +129,6 @@ impl<const N: usize> NetworkBoot<N> {
         for (node, settings) in self.nodes.iter_mut().zip(&settings.nodes) {
             node.set_settings(*settings);
         }
-    }
-
-    /// Before the nodes are reset for the first time, those that the network
-    /// names by serial number and that have no node-ID are given theirs. Without
-    /// this it is done only when such a node is missing.
-    pub fn give_ids_first(&mut self) {
-        self.scan_first = true;
     }
 
     /// How many nodes are booted.
@@ -184,10 +174,10 @@ impl<const N: usize> NetworkBoot<N> {
             return;
         }
         if frame.id() == CobId::LSS_SLAVE {
-            if self.phase == Phase::Scanning
-                && let Some(action) = self.factory.on_frame(frame, self.network.nodes)
+            if self.searched
+                && let Some(event) = self.factory.on_frame(frame, self.network.nodes)
             {
-                self.push(action);
+                self.found(event, now);
             }
             return;
         }
@@ -261,14 +251,12 @@ impl<const N: usize> NetworkBoot<N> {
 
     /// When [`poll`](Self::poll) has to be called again at the latest.
     pub fn next_deadline(&self) -> Option<Instant> {
-        let own = match self.phase {
-            Phase::Scanning => self.factory.next_deadline(),
-            phase => phase.deadline(),
-        };
+        let search = self.factory.next_deadline();
         self.nodes
             .iter()
             .filter_map(NodeBoot::next_deadline)
-            .chain(own)
+            .chain(self.phase.deadline())
+            .chain(search.filter(|_| self.phase.listens()))
             .min()
     }
 

@@ -10,8 +10,6 @@ pub(super) enum Phase {
     /// Nothing is sent, so that drives left running miss the master's
     /// heartbeat and come to rest. Not of the standard: motion wants it.
     Silent { until: Instant },
-    /// Nodes without node-ID are looked for (CiA 305).
-    Scanning,
     /// NMT reset communication is sent; the nodes boot, each at its own pace
     /// (CiA 302-2, "NMT start-up", "Reset communication" and "Boot slave").
     Booting,
@@ -53,8 +51,7 @@ impl Phase {
     pub(super) const fn listens(self) -> bool {
         matches!(
             self,
-            Phase::Scanning
-                | Phase::Booting
+            Phase::Booting
                 | Phase::AwaitingOrder
                 | Phase::Synchronising { .. }
                 | Phase::Starting

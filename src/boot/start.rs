@@ -12,25 +12,19 @@ use crate::time::{Duration, Instant};
 impl<const N: usize> NetworkBoot<N> {
     pub(super) fn advance(&mut self, now: Instant) {
         match self.phase {
-            Phase::Silent { until } if now >= until => {
-                if self.scan_first && !self.scanned {
-                    self.scan();
-                } else {
-                    self.reset_all(now);
-                }
-            }
+            Phase::Silent { until } if now >= until => self.reset_all(now),
             Phase::BusOff { until } if now >= until => {
                 self.push(Action::RestartController);
                 self.report(Event::BusRestarted);
                 let until = now + self.network.master.silence;
                 self.phase = self.halted.unwrap_or(Phase::Silent { until });
             }
-            Phase::Scanning => self.advance_scan(now),
-            phase if phase.listens() => {
-                self.handle_lost(now);
-                self.advance_start(now);
+            phase => {
+                if phase.listens() && !self.search(now) {
+                    self.handle_lost(now);
+                    self.advance_start(now);
+                }
             }
-            _ => {}
         }
     }
 
@@ -71,33 +65,53 @@ impl<const N: usize> NetworkBoot<N> {
     pub(super) fn begin_all(&mut self, reset: bool, now: Instant) {
         for node in &mut self.nodes {
             node.begin(self.boot_time, reset, now);
+            node.allow_search(!self.searched);
         }
         self.ordered = false;
         self.phase = Phase::Booting;
         self.tell_ready();
     }
 
-    fn scan(&mut self) {
-        self.scanned = true;
-        self.report(Event::Scanning);
-        self.phase = Phase::Scanning;
-    }
-
-    fn advance_scan(&mut self, now: Instant) {
+    /// LSS is required where a node that the network names by its serial number
+    /// did not boot: it may have no node-ID. Whether there is something to tell or
+    /// to send.
+    fn search(&mut self, now: Instant) -> bool {
+        if !self.searched {
+            if !self.nodes.iter().any(NodeBoot::is_missing) {
+                return false;
+            }
+            self.searched = true;
+            for node in &mut self.nodes {
+                node.allow_search(false);
+            }
+            self.report(Event::Scanning);
+        }
         let nodes = &self.nodes;
         let missing = |place| nodes.get(place).is_some_and(NodeBoot::is_missing);
-        if let Some(action) = self.factory.poll(now, self.network.nodes, missing) {
-            return self.push(action);
-        }
-        match self.factory.finished() {
-            None => {}
-            Some(given) if given || self.scan_first => self.reset_all(now),
-            // The wait was in vain: what was found out before stands.
-            Some(_) => {
-                self.phase = Phase::Booting;
-                self.advance_start(now);
+        match self.factory.poll(now, self.network.nodes, missing) {
+            Some(Action::Report(event)) => self.found(event, now),
+            Some(action) => self.push(action),
+            None => {
+                if self.factory.is_over() {
+                    for node in &mut self.nodes {
+                        node.not_found(now);
+                    }
+                }
+                return false;
             }
         }
+        true
+    }
+
+    /// What the search has to tell.
+    #[inline(never)]
+    pub(super) fn found(&mut self, event: Event, now: Instant) {
+        if let Event::IdGiven { node, .. } = event
+            && let Some(node) = self.nodes.iter_mut().find(|boot| boot.node().id == node)
+        {
+            node.await_boot_up(self.boot_time, now);
+        }
+        self.report(event);
     }
 
     /// All nodes are waited for even when one has failed, so that one run
@@ -105,9 +119,6 @@ impl<const N: usize> NetworkBoot<N> {
     fn finish_booting(&mut self, now: Instant) {
         if !self.nodes.iter().all(NodeBoot::is_settled) {
             return;
-        }
-        if !self.scanned && self.nodes.iter().any(NodeBoot::is_missing) {
-            return self.scan();
         }
         if self.mandatory_up() {
             if self.startup.has(Startup::NOT_BY_ITSELF) && !self.ordered {

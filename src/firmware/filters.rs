@@ -11,6 +11,7 @@ pub(crate) enum Handler {
     /// A TPDO: 0 for TPDO1, 1 for TPDO2.
     Tpdo(usize),
     Emcy,
+    /// For the boot-up: an answer of an SDO server or of an LSS slave.
     SdoResponse,
     /// Boot-up and heartbeat.
     ErrorControl,
@@ -40,7 +41,7 @@ const fn one(identifier: u16) -> RangeFilter {
 
 /// The filters. Process data and the rest come through different FIFOs, so that
 /// a burst of one does not push out the other.
-pub(crate) static FILTERS: [RangeFilter; 8] = [
+pub(crate) static FILTERS: [RangeFilter; 9] = [
     nodes(FunctionCode::Tpdo1, Fifo::Fifo0),
     nodes(FunctionCode::Tpdo2, Fifo::Fifo0),
     nodes(FunctionCode::Emcy, Fifo::Fifo1),
@@ -49,6 +50,7 @@ pub(crate) static FILTERS: [RangeFilter; 8] = [
     one(CobId::of(FunctionCode::SdoRequest, sample::SIX_EPOS4.master.node).get()),
     one(CobId::TIME.get()),
     one(CobId::NMT.get()),
+    one(CobId::LSS_SLAVE.get()),
 ];
 
 /// The handler of each filter.
@@ -61,4 +63,5 @@ pub(crate) static HANDLERS: [Handler; FILTERS.len()] = [
     Handler::Request,
     Handler::Request,
     Handler::Request,
+    Handler::SdoResponse,
 ];

@@ -57,7 +57,11 @@ impl Log {
     pub(crate) fn boot(&mut self, event: &Event) {
         match event {
             Event::Failed(..) => error!("{}", event),
-            Event::NetworkFailed => warn!("{}", event),
+            Event::NetworkFailed
+            | Event::IdGiven { stored: false, .. }
+            | Event::IdRefused { .. }
+            | Event::IdUnanswered(_)
+            | Event::Stranger(_) => warn!("{}", event),
             Event::Configuring { .. } => defmt::debug!("{}", event),
             _ => info!("{}", event),
         }

@@ -60,13 +60,16 @@ impl LssAddress {
             Part::Serial => self.serial,
         }
     }
+}
 
-    pub(super) const fn set(&mut self, part: Part, number: u32) {
-        match part {
-            Part::Vendor => self.vendor = number,
-            Part::Product => self.product = number,
-            Part::Revision => self.revision = number,
-            Part::Serial => self.serial = number,
+impl From<[u32; 4]> for LssAddress {
+    /// The numbers in their order.
+    fn from([vendor, product, revision, serial]: [u32; 4]) -> LssAddress {
+        LssAddress {
+            vendor,
+            product,
+            revision,
+            serial,
         }
     }
 }

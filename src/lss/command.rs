@@ -60,10 +60,30 @@ impl ConfigurationResult {
         ConfigurationResult { error, specific: 0 }
     }
 
+    /// The result in `frame` if it answers the service that is `awaited`: less
+    /// code than [`Answer::decode`] for whoever needs no other answer.
+    pub(crate) fn decode(frame: &Frame, awaited: Awaited) -> Option<ConfigurationResult> {
+        let [cs, error, specific, ..] = eight(frame, CobId::LSS_SLAVE)?;
+        (cs == awaited as u8).then_some(ConfigurationResult { error, specific })
+    }
+
     /// Whether it was done.
     pub const fn is_ok(self) -> bool {
         self.error == 0
     }
+}
+
+/// Services whose answer is a result, or nothing but an answer, by the command
+/// specifier of the answer.
+#[derive(Clone, Copy, Debug)]
+#[repr(u8)]
+pub(crate) enum Awaited {
+    /// Configure node-ID.
+    NodeId = cs::NODE_ID,
+    /// Store configuration.
+    Store = cs::STORE,
+    /// Fastscan.
+    Identified = cs::IDENTIFIED,
 }
 
 /// What the master sends on 7E5h.
@@ -132,7 +152,13 @@ type Bytes = [u8; MAX_DATA];
 impl Request {
     /// The frame to send.
     pub fn frame(&self) -> Frame {
-        let bytes = match *self {
+        Frame::full(CobId::LSS_MASTER, self.bytes())
+    }
+
+    /// Its data. Where the request is known, so is the data: little code is left.
+    #[inline(always)]
+    pub(crate) fn bytes(&self) -> Bytes {
+        match *self {
             Request::SwitchGlobal(Mode::Waiting) => short(cs::SWITCH_GLOBAL, 0, 0),
             Request::SwitchGlobal(Mode::Configuration) => short(cs::SWITCH_GLOBAL, 1, 0),
             Request::Select(part, number) => long(cs::SELECT + part.position(), number),
@@ -149,8 +175,7 @@ impl Request {
                 let [a, b, c, d] = id.to_le_bytes();
                 [cs::FASTSCAN, a, b, c, d, bit, sub, next]
             }
-        };
-        Frame::full(CobId::LSS_MASTER, bytes)
+        }
     }
 
     /// `None` unless `frame` has eight bytes, comes on 7E5h and is a command

@@ -5,35 +5,17 @@ use super::command::Request;
 
 /// `bitCheck` that makes all nodes start anew.
 pub(super) const RESTART: u8 = 0x80;
-const HIGHEST_BIT: u8 = 31;
-
-/// How one number of the LSS address is found.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum ScanPart {
-    /// Bit by bit: 33 questions.
-    Unknown,
-    /// It is known and only confirmed: one question. Nodes with another number
-    /// are left out.
-    Known(u32),
-}
+const BITS: u8 = 32;
 
 /// The questions of one scan and what follows from the answers.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Fastscan {
-    parts: [ScanPart; 4],
-    found: LssAddress,
-    at: Question,
-}
-
-#[derive(Clone, Copy, Debug)]
-enum Question {
-    /// Is there anybody?
-    Anybody,
-    /// Is this bit of this part 0?
-    Bit(Part, u8),
-    /// Is this the whole number?
-    Confirm(Part),
+    known: [Option<u32>; 4],
+    found: [u32; 4],
+    part: Part,
+    /// Bits of the part that are not known yet; 0: the whole number is to be
+    /// confirmed; [`RESTART`]: is there anybody?
+    left: u8,
 }
 
 /// What an answer, or its absence, leads to.
@@ -49,74 +31,72 @@ pub(crate) enum Verdict {
 }
 
 impl Fastscan {
-    pub(crate) const fn new(parts: [ScanPart; 4]) -> Fastscan {
+    /// Numbers that are known are only confirmed.
+    pub(crate) const fn new(known: [Option<u32>; 4]) -> Fastscan {
         Fastscan {
-            parts,
-            found: LssAddress {
-                vendor: 0,
-                product: 0,
-                revision: 0,
-                serial: 0,
-            },
-            at: Question::Anybody,
+            known,
+            found: [0; 4],
+            part: Part::Vendor,
+            left: RESTART,
         }
     }
 
     pub(crate) fn question(&self) -> Request {
-        match self.at {
-            Question::Anybody => Request::Fastscan {
-                id: 0,
-                bit: RESTART,
-                sub: 0,
-                next: 0,
+        let sub = self.part.position();
+        Request::Fastscan {
+            id: self.number(),
+            bit: match self.left {
+                RESTART => RESTART,
+                left => left.saturating_sub(1),
             },
-            Question::Bit(part, bit) => Request::Fastscan {
-                id: self.found.part(part),
-                bit,
-                sub: part.position(),
-                next: part.position(),
-            },
-            Question::Confirm(part) => Request::Fastscan {
-                id: self.found.part(part),
-                bit: 0,
-                sub: part.position(),
+            sub,
+            next: match self.left {
                 // After the last part the node enters configuration.
-                next: part.next().map_or(0, Part::position),
+                0 => (sub + 1) % Part::ALL.len() as u8,
+                _ => sub,
             },
         }
     }
 
     pub(crate) fn answer(&mut self, yes: bool) -> Verdict {
-        match (self.at, yes) {
-            (Question::Anybody, false) => return Verdict::Nobody,
-            (Question::Anybody, true) => self.begin(Part::Vendor),
-            (Question::Bit(part, bit), yes) => {
-                if !yes {
-                    let number = self.found.part(part) | 1 << bit;
-                    self.found.set(part, number);
-                }
-                self.at = match bit.checked_sub(1) {
-                    Some(bit) => Question::Bit(part, bit),
-                    None => Question::Confirm(part),
-                };
-            }
-            (Question::Confirm(part), false) => return Verdict::Lost(part),
-            (Question::Confirm(part), true) => match part.next() {
+        match (self.left, yes) {
+            (RESTART, false) => return Verdict::Nobody,
+            (RESTART, true) => self.begin(Part::Vendor),
+            (0, false) => return Verdict::Lost(self.part),
+            (0, true) => match self.part.next() {
                 Some(next) => self.begin(next),
-                None => return Verdict::Found(self.found),
+                None => return Verdict::Found(LssAddress::from(self.found)),
             },
+            (_, yes) => {
+                self.left -= 1;
+                if !yes {
+                    self.set(self.number() | 1 << self.left);
+                }
+            }
         }
         Verdict::Continue
     }
 
     fn begin(&mut self, part: Part) {
-        let known = self.parts.get(usize::from(part.position()));
-        self.at = match known {
-            Some(ScanPart::Known(number)) => {
-                self.found.set(part, *number);
-                Question::Confirm(part)
+        self.part = part;
+        let known = self.known.get(usize::from(part.position()));
+        match known.copied().flatten() {
+            Some(number) => {
+                self.set(number);
+                self.left = 0;
             }
-            _ => Question::Bit(part, HIGHEST_BIT),
-        };
+            None => self.left = BITS,
+        }
+    }
+
+    fn number(&self) -> u32 {
+        let found = self.found.get(usize::from(self.part.position()));
+        found.copied().unwrap_or_default()
+    }
+
+    fn set(&mut self, number: u32) {
+        if let Some(found) = self.found.get_mut(usize::from(self.part.position())) {
+            *found = number;
+        }
     }
 }

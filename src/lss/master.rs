@@ -2,7 +2,7 @@
 
 use super::address::{LssAddress, Part};
 use super::command::{Answer, ConfigurationResult, Mode, Request};
-use super::fastscan::{Fastscan, ScanPart, Verdict};
+use super::fastscan::{Fastscan, Verdict};
 use crate::frame::Frame;
 use crate::id::NodeId;
 use crate::time::{Duration, Instant};
@@ -36,8 +36,10 @@ pub enum Service {
     Inquire(Part),
     /// Reads the selected node's node-ID.
     InquireNodeId,
-    /// Finds one node without node-ID and selects it.
-    Fastscan([ScanPart; 4]),
+    /// Finds one node without node-ID and selects it. The numbers of its LSS
+    /// address that are known are only confirmed, by one question each, and nodes
+    /// with others left out; each of the rest is found bit by bit, by 33.
+    Fastscan([Option<u32>; 4]),
 }
 
 /// What the caller has to do.
@@ -190,8 +192,8 @@ impl LssMaster {
                 };
                 (silence, Request::Activate { delay })
             }
-            Service::Fastscan(parts) => {
-                let scan = Fastscan::new(parts);
+            Service::Fastscan(known) => {
+                let scan = Fastscan::new(known);
                 (State::Scanning { scan, yes: false }, scan.question())
             }
             Service::ConfigureNodeId(node) => (State::Waiting(service), Request::NodeId(node)),

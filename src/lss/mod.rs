@@ -10,8 +10,8 @@ mod slave;
 
 pub use address::{LssAddress, Part};
 pub use bit_rate::BitRate;
+pub(crate) use command::Awaited;
 pub use command::{Answer, ConfigurationResult, Mode, Request};
-pub use fastscan::ScanPart;
 pub(crate) use fastscan::{Fastscan, Verdict};
 pub use master::{LssError, LssMaster, Outcome, Progress, Service};
 pub use slave::{Device, LssSlave, SlaveEvent};

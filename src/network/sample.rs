@@ -16,6 +16,9 @@ const EPOS4_DEVICE_TYPE: u32 = 0x0002_0192;
 const MAXON: u32 = 0x0000_00FB;
 /// EPOS4 Module 50/5: the hardware version in the upper word.
 const EPOS4_50_5: u32 = 0x6150_0000;
+/// Serial numbers of the drives: this and the node-ID. A drive without node-ID is
+/// found, and given its own, by it.
+const FIRST_SERIAL: u32 = 0x2600_0000;
 /// Firmware 0170h.
 const EPOS4_REVISION: u32 = 0x0170_0000;
 
@@ -96,7 +99,7 @@ const fn epos4(id: NodeId, name: &'static str) -> Node {
             vendor: Some(MAXON),
             product: Some(EPOS4_50_5),
             revision: Some(EPOS4_REVISION),
-            serial: None,
+            serial: Some(FIRST_SERIAL + id.get() as u32),
         },
         // Ten per second each: noise on the bus, but a dead drive is known
         // within two periods even where its TPDOs were not yet started.

@@ -28,8 +28,7 @@ fn running(bits: u32) -> Rig {
 fn scanning(after: u32) -> Rig {
     let mut rig = Rig::new(network(2, |node| node.identity.serial = Some(SERIAL)));
     unconfigured(&mut rig.fakes[1], SERIAL);
-    rig.boot.give_ids_first();
-    rig.run_for(ms(600 + after));
+    rig.run_for(ms(2100 + after));
     rig
 }
 
@@ -163,8 +162,8 @@ const STATES: &[Place] = &[
         rig.run();
         rig
     }),
-    ("is anybody without node-ID", "at: Anybody", || scanning(10)),
-    ("serial number asked for", "at: Confirm(Serial)", || {
+    ("is anybody without node-ID", "left: 128", || scanning(10)),
+    ("serial number asked for", "part: Serial, left: 0", || {
         scanning(210)
     }),
     ("node-ID given", "step: Give", || {

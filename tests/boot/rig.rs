@@ -61,6 +61,8 @@ impl Fake {
                 ((0x1018, 1), 0x0000_00FB),
                 ((0x1018, 2), 0x6150_0000),
                 ((0x1018, 3), 0x0170_0000),
+                // As the sample network has it.
+                ((0x1018, 4), 0x2600_0000 + u32::from(id)),
             ],
             written: Vec::new(),
             refuses: None,

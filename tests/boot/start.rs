@@ -48,6 +48,7 @@ fn a_node_is_identified_before_anything_is_written() {
         [0x40, 0x18, 0x10, 0x01, 0, 0, 0, 0],
         [0x40, 0x18, 0x10, 0x02, 0, 0, 0, 0],
         [0x40, 0x18, 0x10, 0x03, 0, 0, 0, 0],
+        [0x40, 0x18, 0x10, 0x04, 0, 0, 0, 0],
     ];
     assert_eq!(to_node_4[..reads.len()], reads);
     let writes = plan(&SIX_EPOS4, &SIX_EPOS4.nodes[3]).count();
@@ -94,9 +95,11 @@ fn a_missing_node_is_named_and_nothing_is_started() {
     start(&mut rig);
     rig.assert_nothing_was_started();
     assert_eq!(rig.failure(3), (Status::B, Cause::NoBootUp));
-    // The silent phase and the boot time, and nothing more.
-    let last = rig.sent.last().unwrap().0;
-    assert!(last < Instant::from_micros(2_100_000));
+    // The silent phase and the boot time, one question whether anybody is without
+    // node-ID, and nothing more.
+    let (last, question) = rig.sent.last().unwrap();
+    assert_eq!(*last, Instant::from_micros(2_100_000));
+    assert_eq!(question.padded(), [0x51, 0, 0, 0, 0, 0x80, 0, 0]);
     assert_eq!(rig.boot.next_deadline(), None);
 }
 

@@ -3,7 +3,7 @@
 
 use canmaster::lss::{
     Answer, BitRate, ConfigurationResult, Device, LssAddress, LssError, LssMaster, LssSlave, Mode,
-    Outcome, Part, Progress, Request, ScanPart, Service, SlaveEvent,
+    Outcome, Part, Progress, Request, Service, SlaveEvent,
 };
 use canmaster::{CobId, Duration, Frame, Instant, NodeId};
 use proptest::prelude::*;
@@ -344,6 +344,29 @@ fn the_master_selects_and_configures() {
 }
 
 #[test]
+fn the_master_sets_the_bit_rate() {
+    let mut master = LssMaster::new(TIMEOUT);
+    let index = BitRate::Kbit500.index();
+    let table = BitRate::STANDARD_TABLE;
+    let timing = Service::ConfigureBitTiming { table, index };
+    for (result, end) in [
+        (
+            ConfigurationResult::REFUSED,
+            Progress::Failed(LssError::Refused(ConfigurationResult::REFUSED)),
+        ),
+        (ConfigurationResult::OK, Progress::Done(Outcome::Confirmed)),
+    ] {
+        assert_eq!(
+            master.start(timing, ms(0)),
+            Ok(to_slave([0x13, 0, 2, 0, 0, 0, 0, 0]))
+        );
+        let node_id = Answer::NodeId(result).frame();
+        assert_eq!(master.on_frame(&node_id), Progress::Nothing);
+        assert_eq!(master.on_frame(&Answer::BitTiming(result).frame()), end);
+    }
+}
+
+#[test]
 fn unconfirmed_services() {
     let mut master = LssMaster::new(TIMEOUT);
     let waiting = Service::SwitchGlobal(Mode::Waiting);
@@ -353,7 +376,10 @@ fn unconfirmed_services() {
     );
     assert_eq!(master.poll(ms(0)), Progress::Done(Outcome::Confirmed));
     let activate = Service::ActivateBitTiming { delay: 100 };
-    master.start(activate, ms(0)).unwrap();
+    assert_eq!(
+        master.start(activate, ms(0)),
+        Ok(to_slave([0x15, 100, 0, 0, 0, 0, 0, 0]))
+    );
     assert_eq!(master.poll(ms(99)), Progress::Nothing);
     assert_eq!(master.poll(ms(100)), Progress::SwitchBitRate);
     assert_eq!(master.poll(ms(199)), Progress::Nothing);
@@ -361,7 +387,7 @@ fn unconfirmed_services() {
 }
 
 /// Scans `slaves`; they answer after a tenth of the timeout. Counts questions.
-fn scan(slaves: &mut [LssSlave], parts: [ScanPart; 4]) -> (Progress, u32) {
+fn scan(slaves: &mut [LssSlave], parts: [Option<u32>; 4]) -> (Progress, u32) {
     let mut master = LssMaster::new(TIMEOUT);
     let mut frame = master.start(Service::Fastscan(parts), ms(0)).unwrap();
     for questions in 1.. {
@@ -378,7 +404,7 @@ fn scan(slaves: &mut [LssSlave], parts: [ScanPart; 4]) -> (Progress, u32) {
     unreachable!()
 }
 
-const UNKNOWN: [ScanPart; 4] = [ScanPart::Unknown; 4];
+const UNKNOWN: [Option<u32>; 4] = [None; 4];
 
 #[test]
 fn fastscan_finds_one_node_after_the_other() {
@@ -417,13 +443,13 @@ fn fastscan_finds_one_node_after_the_other() {
 fn what_is_known_is_only_confirmed() {
     let mut slaves = [LssSlave::new(DRIVE, None)];
     let mut parts = UNKNOWN;
-    parts[0] = ScanPart::Known(DRIVE.vendor);
-    parts[3] = ScanPart::Known(DRIVE.serial);
+    parts[0] = Some(DRIVE.vendor);
+    parts[3] = Some(DRIVE.serial);
     let (end, questions) = scan(&mut slaves, parts);
     assert_eq!(end, Progress::Done(Outcome::Found(DRIVE)));
     assert_eq!(questions, 1 + 2 + 2 * 33);
     let mut slaves = [LssSlave::new(DRIVE, None)];
-    parts[3] = ScanPart::Known(1);
+    parts[3] = Some(1);
     let (end, _) = scan(&mut slaves, parts);
     assert_eq!(end, Progress::Failed(LssError::Lost(Part::Serial)));
     assert_eq!(slaves[0].mode(), Mode::Waiting);

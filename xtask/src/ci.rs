@@ -103,6 +103,8 @@ fn sizes() -> Result<()> {
 
 fn one_run() -> Result<()> {
     let options = RunOptions {
+        factory: false,
+        stranger: false,
         seconds: None,
         seed: 1,
         without: Vec::new(),

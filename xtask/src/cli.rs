@@ -91,8 +91,15 @@ pub(crate) struct RunOptions {
     /// Leave this drive off the bus; may be repeated
     #[arg(long, value_name = "NODE", value_parser = node)]
     pub(crate) without: Vec<NodeId>,
+    /// The drives come from the factory: none has a node-ID; the firmware finds
+    /// them by serial number and gives them theirs
+    #[arg(long)]
+    pub(crate) factory: bool,
+    /// One more drive without node-ID, which the network does not name
+    #[arg(long)]
+    pub(crate) stranger: bool,
     /// Give a drive a fault: NODE:identity, NODE:refuse=INDEX:SUB (hex),
-    /// NODE:silent (in motion); may be repeated
+    /// NODE:forgetful (stores nothing), NODE:silent (in motion); may be repeated
     #[arg(long, value_name = "FAULT")]
     pub(crate) fault: Vec<Fault>,
     /// Never run ahead of the clock on the wall

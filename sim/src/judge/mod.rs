@@ -5,9 +5,11 @@ pub mod arrivals;
 pub mod axis;
 pub mod bus;
 pub mod grid;
+pub mod lss;
 pub mod verdict;
 
 pub use arrivals::{Arrival, Assignment, Part, Release, arrivals, worst_pair};
 pub use axis::{AxisMonitor, Movement, STANDSTILL_RPM, TracePoint};
 pub use bus::{BusFigures, Traffic};
+pub use lss::LssFigures;
 pub use verdict::{ARRIVAL_TOLERANCE, Evidence, Outcome, Verdict, verdict};

@@ -113,6 +113,11 @@ impl World<'_> {
             .map(|station| station.as_ref().map(|station| station.drive.status()))
     }
 
+    /// What the drive is in that the network does not name, if there is one.
+    pub fn stranger(&self) -> Option<DriveStatus> {
+        self.stranger.as_ref().map(|station| station.drive.status())
+    }
+
     /// Round trips that were finished, and whether one is going on.
     pub fn round_trips(&self) -> (usize, bool) {
         let done = self

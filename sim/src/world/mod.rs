@@ -9,6 +9,7 @@ mod operator;
 mod program;
 mod record;
 mod scenario;
+mod station;
 mod steps;
 mod stimulus;
 pub mod trials;
@@ -29,12 +30,13 @@ use rand_pcg::Pcg64Mcg;
 use crate::board::{Board, BoardError, BoardOptions, ResetCause};
 use crate::bridge::Bridge;
 use crate::bus::{BitTiming, Bus, Event, PortId, WireRecord};
-use crate::drive::{Drive, DriveConfig, DriveStatus, cia402};
+use crate::drive::{DriveConfig, DriveStatus, cia402};
 use crate::judge::Assignment;
 use crate::log::{LogDecoder, LogLine};
 use crate::time::Time;
 use operator::Operator;
 use record::Seen;
+use station::Station;
 use stimulus::Agenda;
 use watch::Watch;
 
@@ -64,13 +66,6 @@ impl Observer for () {
     fn look(&mut self, _: &World<'_>) {}
 }
 
-/// A drive with its place on the bus.
-struct Station {
-    drive: Drive,
-    port: PortId,
-    timing: Option<BitTiming>,
-}
-
 /// The machine.
 pub struct World<'i> {
     scenario: Scenario,
@@ -83,6 +78,8 @@ pub struct World<'i> {
     bus: Bus,
     /// In the order of the network; `None`: not on the bus.
     stations: Vec<Option<Station>>,
+    /// A drive that is none of the network.
+    stranger: Option<Station>,
     ports: Vec<String>,
     bridge: Option<Bridge>,
     guest: Option<guest::Guest>,
@@ -107,22 +104,20 @@ impl<'i> World<'i> {
         let mut ports = vec!["board".to_string()];
         let board_port = bus.attach(&ports[0]);
         let board = Board::new(image.elf(), board_options(&scenario))?;
+        let mut connect = |config: DriveConfig, name: String| {
+            let port = bus.attach(&name);
+            ports.push(name);
+            Station::new(config, port)
+        };
         let mut stations = Vec::new();
-        for node in network().nodes {
-            let present = !scenario.without.contains(&node.id);
-            stations.push(present.then(|| {
-                let faults = scenario.faults.get(&node.id).into_iter().flatten().copied();
-                let config = DriveConfig::new(node.id, scenario.seed);
-                let drive = Drive::new(faults.fold(config, DriveConfig::with));
-                ports.push(format!("node {}", node.id.get()));
-                let port = bus.attach(&ports[ports.len() - 1]);
-                Station {
-                    drive,
-                    port,
-                    timing: None,
-                }
+        for config in station::machine(&scenario) {
+            stations.push(config.map(|config| {
+                let name = format!("node {}", config.node.get());
+                connect(config, name)
             }));
         }
+        let stranger = station::stranger(&scenario);
+        let stranger = stranger.map(|config| connect(config, "stranger".to_string()));
         let assignment = assignment();
         let moves = (0..stations.len())
             .map(|axis| assignment.of_axis(axis).count())
@@ -147,6 +142,7 @@ impl<'i> World<'i> {
             board_timing: None,
             bus,
             stations,
+            stranger,
             ports,
             bridge: None,
             guest: None,
@@ -280,6 +276,11 @@ fn board_options(scenario: &Scenario) -> BoardOptions {
         flash: scenario.flash.clone(),
         ..BoardOptions::default()
     }
+}
+
+/// The drive has a node-ID and has booted with it.
+pub fn has_node_id(status: &DriveStatus) -> bool {
+    status.node_id.is_some()
 }
 
 /// The drive has sent its boot-up.

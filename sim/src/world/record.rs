@@ -7,8 +7,8 @@ use crate::board::BoardStats;
 use crate::bus::WireRecord;
 use crate::drive::DriveStatus;
 use crate::judge::{
-    Arrival, Assignment, AxisMonitor, BusFigures, Evidence, Release, Traffic, Verdict, arrivals,
-    bus, verdict,
+    Arrival, Assignment, AxisMonitor, BusFigures, Evidence, LssFigures, Release, Traffic, Verdict,
+    arrivals, bus, lss, verdict,
 };
 use crate::log::LogLine;
 use crate::time::Time;
@@ -60,6 +60,8 @@ pub struct Record {
     pub arrivals: Vec<Arrival>,
     /// When the machine got ready.
     pub startup: Startup,
+    /// The search for drives without node-ID, if there was one.
+    pub lss: Option<LssFigures>,
     /// Figures of the bus.
     pub bus: BusFigures,
     /// Figures of the emulated board.
@@ -91,6 +93,7 @@ impl Seen {
             unfinished: &self.unfinished,
         });
         Record {
+            lss: lss::judge(&self.wire),
             seed: self.seed,
             simulated: self.simulated,
             ports: self.ports,

@@ -27,6 +27,8 @@ pub enum Ailment {
         /// Sub-index of the entry.
         sub: u8,
     },
+    /// Its memory is broken: it stores nothing.
+    Forgetful,
     /// It sends nothing any more from full motion on.
     SilentInMotion,
 }
@@ -40,6 +42,11 @@ pub struct Scenario {
     pub end: Time,
     /// Drives that are not on the bus.
     pub without: Vec<NodeId>,
+    /// The drives come from the factory: none has a node-ID. They are switched on
+    /// in an order drawn from the seed.
+    pub factory: bool,
+    /// There is one more drive without node-ID, which the network does not name.
+    pub stranger: bool,
     /// Faults that drives have from power-on.
     pub faults: BTreeMap<NodeId, Vec<DriveFault>>,
     /// Done at given moments.
@@ -59,6 +66,8 @@ impl Scenario {
             seed,
             end,
             without: Vec::new(),
+            factory: false,
+            stranger: false,
             faults: BTreeMap::new(),
             stimuli: Vec::new(),
             in_motion: Vec::new(),
@@ -73,6 +82,18 @@ impl Scenario {
     /// The same without a drive.
     pub fn without(mut self, node: NodeId) -> Scenario {
         self.without.push(node);
+        self
+    }
+
+    /// The same with drives from the factory.
+    pub fn from_factory(mut self) -> Scenario {
+        self.factory = true;
+        self
+    }
+
+    /// The same with a stranger on the bus.
+    pub fn with_stranger(mut self) -> Scenario {
+        self.stranger = true;
         self
     }
 
@@ -96,6 +117,7 @@ impl Scenario {
                 let abort = AbortCode::VALUE_RANGE.0;
                 self.fault(node, DriveFault::RefuseWrite { index, sub, abort })
             }
+            Ailment::Forgetful => self.fault(node, DriveFault::StoreFails),
             Ailment::SilentInMotion => self.in_motion(Stimulus::Silence { node }),
         }
     }

@@ -2,6 +2,7 @@
 //! then the drives; and now and then the machine is looked at.
 
 use super::operator::View;
+use super::station::Station;
 use super::watch::AxisTruth;
 use super::{Observer, World, enabled, operational, round_trip};
 use crate::board::Stop;
@@ -48,11 +49,7 @@ impl World<'_> {
 
     /// When something happens next that is not the board's doing.
     fn next_moment(&self) -> Time {
-        let deadlines = self
-            .stations
-            .iter()
-            .flatten()
-            .map(|station| station.drive.next_deadline());
+        let deadlines = self.drives().map(|station| station.drive.next_deadline());
         [
             self.bus.next_event(),
             self.agenda.next(),
@@ -63,6 +60,11 @@ impl World<'_> {
         .chain(deadlines)
         .min()
         .unwrap_or(self.next_look)
+    }
+
+    /// Every drive on the bus, that of no network too.
+    fn drives(&self) -> impl Iterator<Item = &Station> {
+        self.stations.iter().flatten().chain(&self.stranger)
     }
 
     fn offer_board(&mut self) {
@@ -81,10 +83,7 @@ impl World<'_> {
         for event in &events {
             if event.port == self.board_port {
                 self.board.can_event(FDCAN1, event);
-            } else if let Some(station) = self
-                .stations
-                .iter_mut()
-                .flatten()
+            } else if let Some(station) = drives(&mut self.stations, &mut self.stranger)
                 .find(|station| station.port == event.port)
             {
                 station.drive.on_event(event);
@@ -105,16 +104,8 @@ impl World<'_> {
     }
 
     fn advance_drives(&mut self) {
-        for station in self.stations.iter_mut().flatten() {
-            if station.drive.next_deadline() <= self.now {
-                station.drive.advance(self.now);
-            }
-            let timing = station.drive.timing();
-            if timing != station.timing {
-                station.timing = timing;
-                self.bus.set_timing(station.port, timing, self.now);
-            }
-            self.bus.offer(station.port, station.drive.offer());
+        for station in drives(&mut self.stations, &mut self.stranger) {
+            station.advance(&mut self.bus, self.now);
         }
         if let Some(bridge) = &mut self.bridge {
             bridge.offer(&mut self.bus, self.now);
@@ -127,7 +118,7 @@ impl World<'_> {
     fn look(&mut self, observer: &mut dyn Observer) {
         self.wire.extend(self.bus.take_records());
         self.read_log(observer);
-        for station in self.stations.iter_mut().flatten() {
+        for station in drives(&mut self.stations, &mut self.stranger) {
             // Control cycles that nobody waits for have not been worked out yet.
             station.drive.advance(self.now);
         }
@@ -190,6 +181,14 @@ impl World<'_> {
                 .is_some_and(|since| self.now >= since + LAST_WORDS)
             && self.watch.at_rest()
     }
+}
+
+/// See [`World::drives`].
+fn drives<'s>(
+    stations: &'s mut [Option<Station>],
+    stranger: &'s mut Option<Station>,
+) -> impl Iterator<Item = &'s mut Station> {
+    stations.iter_mut().flatten().chain(stranger)
 }
 
 fn axis_truth(drive: &Drive) -> AxisTruth {

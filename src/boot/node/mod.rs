@@ -13,7 +13,7 @@ use crate::objects;
 use crate::sdo::Client;
 use crate::time::{Duration, Instant};
 use heapless::Deque;
-use state::{AwaitBootUp, AwaitErrorControl, AwaitReset, GivenUp, Identify, Idle, State};
+use state::{AwaitBootUp, AwaitErrorControl, AwaitReset, GivenUp, Identify, Idle, Missing, State};
 
 /// Actions that one stimulus can cause at most: an abort or a step that ends,
 /// the next request and reports.
@@ -49,6 +49,8 @@ pub(super) struct NodeBoot {
     lost: bool,
     /// Somebody asked for another state than operational.
     held: bool,
+    /// If it does not boot, it may be looked for by its serial number.
+    search: bool,
     outbox: Deque<Action, OUTBOX>,
 }
 
@@ -74,6 +76,7 @@ impl NodeBoot {
             fresh: false,
             lost: false,
             held: false,
+            search: false,
             outbox: Deque::new(),
         }
     }
@@ -133,14 +136,31 @@ impl NodeBoot {
         matches!(self.state, State::Lost(_))
     }
 
-    /// It names a serial number by which it can be found, and was never heard.
-    pub(super) fn is_missing(&self) -> bool {
-        let unheard = match self.result {
-            BootResult::Pending => matches!(self.state, State::Idle(_)),
-            BootResult::Failed(failure) => failure.cause == Cause::NoBootUp,
-            _ => false,
-        };
-        unheard && self.is(0) && self.node.identity.serial.is_some()
+    /// It did not boot and is to be looked for by its serial number.
+    pub(super) const fn is_missing(&self) -> bool {
+        matches!(self.state, State::Missing(_))
+    }
+
+    /// If it does not boot, it is looked for before it is given up, should the
+    /// network name its serial number.
+    pub(super) const fn allow_search(&mut self, allowed: bool) {
+        self.search = allowed && self.node.identity.serial.is_some();
+    }
+
+    /// Nobody is looked for any more.
+    pub(super) fn not_found(&mut self, now: Instant) {
+        if self.is_missing() {
+            self.fail(Status::B, Cause::NoBootUp, now);
+        }
+    }
+
+    /// It was reset, or given its node-ID: it boots.
+    #[inline(never)]
+    pub(super) fn await_boot_up(&mut self, boot_time: Duration, now: Instant) {
+        self.boot_deadline = deadline(boot_time, now);
+        self.state = State::AwaitBootUp(AwaitBootUp {
+            until: self.boot_deadline.unwrap_or(now + ATTEMPT),
+        });
     }
 
     /// The boot-up begins. `reset`: the node is to be reset by itself, unless it
@@ -150,6 +170,7 @@ impl NodeBoot {
         self.result = BootResult::Pending;
         self.gave_up = false;
         self.held = false;
+        self.search = false;
         self.restarts = 0;
         self.boot_deadline = deadline(boot_time, now);
         if !self.is(0) {
@@ -163,17 +184,16 @@ impl NodeBoot {
         if reset && !keep_alive {
             self.send(Command::ResetCommunication);
         }
-        let until = self.boot_deadline.unwrap_or(now + ATTEMPT);
-        self.state = if !self.is(Assignment::MAY_START) {
+        self.await_boot_up(boot_time, now);
+        if !self.is(Assignment::MAY_START) {
             self.guard = now;
-            State::AwaitErrorControl(AwaitErrorControl {
+            let until = self.boot_deadline.unwrap_or(now + ATTEMPT);
+            self.state = State::AwaitErrorControl(AwaitErrorControl {
                 deadline: until + self.patience(),
-            })
+            });
         } else if keep_alive {
-            State::Identify(Identify { item: 0 })
-        } else {
-            State::AwaitBootUp(AwaitBootUp { until })
-        };
+            self.state = State::Identify(Identify { item: 0 });
+        }
     }
 
     /// Nothing more is done until [`begin`](Self::begin).
@@ -208,6 +228,7 @@ impl NodeBoot {
     /// The time of a state is over.
     fn expire(&mut self, now: Instant) {
         match self.state {
+            State::AwaitBootUp(_) if self.search => self.state = State::Missing(Missing),
             State::AwaitBootUp(_) if self.boot_time_is_over(now) => {
                 self.fail(Status::B, Cause::NoBootUp, now);
             }

@@ -15,6 +15,11 @@ pub(super) struct AwaitBootUp {
     pub(super) until: Instant,
 }
 
+/// It did not boot in its time and is looked for among the nodes without node-ID
+/// (CiA 302-2, "NMT start-up": LSS is required; CiA 305).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Missing;
+
 /// Reading 1000h and 1018h and comparing them with 1F84h .. 1F88h (CiA 302-2,
 /// "Boot slave", steps 2 to 6; B, C, D, M, N, O).
 #[derive(Clone, Copy, Debug)]
@@ -105,6 +110,7 @@ pub(super) struct GivenUp {
 pub(super) enum State {
     Idle(Idle),
     AwaitBootUp(AwaitBootUp),
+    Missing(Missing),
     Identify(Identify),
     Retry(Retry),
     AwaitState(AwaitState),

@@ -5,7 +5,7 @@ use std::str::FromStr;
 use canmaster::{NodeId, network};
 use canmaster_sim::world::{Ailment, Scenario};
 
-/// `NODE:identity`, `NODE:refuse=INDEX[:SUB]`, `NODE:silent`.
+/// `NODE:identity`, `NODE:refuse=INDEX[:SUB]`, `NODE:forgetful`, `NODE:silent`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Fault {
     node: NodeId,
@@ -19,7 +19,8 @@ impl Fault {
     }
 }
 
-const HELP: &str = "expected NODE:identity, NODE:refuse=INDEX[:SUB] in hex, or NODE:silent";
+const HELP: &str =
+    "expected NODE:identity, NODE:refuse=INDEX[:SUB] in hex, NODE:forgetful, or NODE:silent";
 
 impl FromStr for Fault {
     type Err = String;
@@ -29,6 +30,7 @@ impl FromStr for Fault {
         let node = crate::cli::node(node)?;
         let ailment = match what.split_once('=') {
             None if what == "identity" => Ailment::WrongIdentity,
+            None if what == "forgetful" => Ailment::Forgetful,
             None if what == "silent" => Ailment::SilentInMotion,
             Some(("refuse", object)) => {
                 let (index, sub) = object.split_once(':').unwrap_or((object, "0"));
@@ -68,6 +70,7 @@ mod tests {
         let read = |text: &str| text.parse::<Fault>();
         let fault = |ailment| Ok(Fault { node, ailment });
         assert_eq!(read("3:identity"), fault(Ailment::WrongIdentity));
+        assert_eq!(read("3:forgetful"), fault(Ailment::Forgetful));
         assert_eq!(read("3:silent"), fault(Ailment::SilentInMotion));
         let refuses = |index, sub| fault(Ailment::RefusesWrite { index, sub });
         assert_eq!(read("3:refuse=6085"), refuses(0x6085, 0));

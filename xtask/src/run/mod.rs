@@ -24,6 +24,9 @@ use summary::Summary;
 /// Time for booting, configuring and enabling, and the operator's patience, of
 /// a run whose length is not given.
 const START: Time = Time::from_ms(3500);
+/// What it takes longer when the drives have no node-ID: their boot time that
+/// passes in vain, the search, and a second boot.
+const FACTORY: Time = Time::from_ms(4500);
 /// What such a run shows after the round trip.
 const MARGIN: Time = Time::from_ms(1000);
 
@@ -72,9 +75,12 @@ fn scenario(options: &RunOptions) -> Scenario {
     let end = match options.seconds {
         Some(seconds) => Time::from_secs_f64(seconds),
         None if options.bridge.is_some() => Time::from_secs_f64(cli::LONGEST_RUN_S),
+        None if options.factory => default_end() + FACTORY,
         None => default_end(),
     };
-    let sound = Scenario::new(options.seed, end);
+    let mut sound = Scenario::new(options.seed, end);
+    sound.factory = options.factory;
+    sound.stranger = options.stranger;
     let complete = options
         .without
         .iter()

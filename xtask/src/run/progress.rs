@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use canmaster::network;
+use canmaster::{CobId, network};
 use canmaster_sim::bridge::Pace;
 use canmaster_sim::bus::RecordKind;
 use canmaster_sim::drive::DriveStatus;
@@ -38,6 +38,8 @@ pub(super) struct Progress {
     next: Time,
     step: &'static str,
     answers: Vec<usize>,
+    /// The master looks for drives without node-ID.
+    search: bool,
     records_seen: usize,
 }
 
@@ -58,6 +60,7 @@ impl Progress {
             next: Time::ZERO,
             step: "",
             answers: vec![0; world::network().nodes.len()],
+            search: false,
             records_seen: 0,
         }
     }
@@ -95,6 +98,7 @@ impl Progress {
 
     /// The step that the machine is in, and how far it has come.
     fn describe(&mut self, world: &World<'_>) -> (&'static str, String) {
+        self.read(world);
         let (done, going_on) = world.round_trips();
         if going_on {
             return (
@@ -102,13 +106,18 @@ impl Progress {
                 format!("round trip {}, positions {}", done + 1, positions(world)),
             );
         }
+        if self.search
+            && let Some(nodes) = still_to_come(world, world::has_node_id)
+        {
+            return ("giving the drives their node-IDs", nodes);
+        }
         if let Some(nodes) = still_to_come(world, world::booted) {
             return ("waiting for the drives to boot", nodes);
         }
         if let Some(nodes) = still_to_come(world, world::operational) {
             return (
                 "configuring the drives",
-                format!("{}; {nodes}", self.configured(world)),
+                format!("{}; {nodes}", self.configured()),
             );
         }
         if let Some(nodes) = still_to_come(world, world::enabled) {
@@ -117,9 +126,9 @@ impl Progress {
         ("standby", format!("{done} round trips made"))
     }
 
-    /// How much of its configuration each node has answered, counted on the
-    /// wire.
-    fn configured(&mut self, world: &World<'_>) -> String {
+    /// Takes in what was on the wire since the last time: answers of the SDO
+    /// servers, and LSS.
+    fn read(&mut self, world: &World<'_>) {
         let network = world::network();
         let wire = world.wire();
         for record in wire.get(self.records_seen..).unwrap_or_default() {
@@ -129,6 +138,7 @@ impl Progress {
             let WireId::Standard(id) = frame.id else {
                 continue;
             };
+            self.search |= id == CobId::LSS_MASTER.get();
             let answers = |node: &network::Node| id == SDO_ANSWER + u16::from(node.id.get());
             let axis = network.nodes.iter().position(answers);
             if let Some(count) = axis.and_then(|axis| self.answers.get_mut(axis)) {
@@ -136,6 +146,11 @@ impl Progress {
             }
         }
         self.records_seen = wire.len();
+    }
+
+    /// How much of its configuration each node has answered.
+    fn configured(&self) -> String {
+        let network = world::network();
         let answers: usize = self.answers.iter().sum();
         let all: usize = network
             .nodes

@@ -63,6 +63,17 @@ struct Image {
 pub(crate) struct Startup {
     boot_to_operational_ms: Option<f64>,
     pub(crate) boot_to_enabled_ms: Option<f64>,
+    /// The search for drives without node-ID, if there was one.
+    lss: Option<Lss>,
+}
+
+#[derive(Clone, Debug, Serialize)]
+struct Lss {
+    from_ms: f64,
+    to_ms: f64,
+    requests: usize,
+    answers: usize,
+    node_ids: usize,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -117,6 +128,13 @@ impl Summary {
             startup: Startup {
                 boot_to_operational_ms: ms(record.startup.operational),
                 boot_to_enabled_ms: ms(record.startup.enabled),
+                lss: record.lss.map(|lss| Lss {
+                    from_ms: rounded(lss.from.as_us_f64() / 1000.0, 3),
+                    to_ms: rounded(lss.to.as_us_f64() / 1000.0, 3),
+                    requests: lss.requests,
+                    answers: lss.answers,
+                    node_ids: lss.node_ids,
+                }),
             },
             drives: record
                 .axes
@@ -179,7 +197,7 @@ impl Summary {
     pub(crate) fn facts(&self) -> Vec<(&'static str, String)> {
         let ms =
             |value: Option<f64>| value.map_or_else(|| "never".into(), |ms| format!("{ms:.1} ms"));
-        vec![
+        let mut facts = vec![
             (
                 "result",
                 format!("{} {}", self.result, self.reason)
@@ -206,7 +224,11 @@ impl Summary {
                     ms(self.startup.boot_to_enabled_ms)
                 ),
             ),
-        ]
+        ];
+        if let Some(lss) = &self.startup.lss {
+            facts.push(("LSS", lss.words()));
+        }
+        facts
     }
 
     fn speed(&self) -> String {
@@ -225,6 +247,15 @@ impl Summary {
             drives.add_row(row);
         }
         format!("{drives}\n{}", table::facts(&self.facts()))
+    }
+}
+
+impl Lss {
+    fn words(&self) -> String {
+        format!(
+            "{} node-IDs given, from {:.1} ms to {:.1} ms: {} requests, {} answers",
+            self.node_ids, self.from_ms, self.to_ms, self.requests, self.answers
+        )
     }
 }
 
