@@ -101,7 +101,8 @@ pub enum Event {
     },
     /// The node was found, but did not answer when it was given its node-ID.
     IdUnanswered(NodeId),
-    /// A node without node-ID that the network does not name.
+    /// A node that stays without node-ID: the network does not name it, or it
+    /// refused the one that it was given.
     Stranger(LssAddress),
 }
 
@@ -171,7 +172,7 @@ in_words!(Event {
         "node {}: found by its serial number, did not answer to its node-ID; reset the board to try again", node
     ),
     Event::Stranger(LssAddress { vendor, product, revision, serial }) => (
-        "a node without node-ID is not in the network description: vendor {:08X}h, product {:08X}h, revision {:08X}h, serial {:08X}h",
+        "a node stays without node-ID, since the network does not name it or it refused: vendor {:08X}h, product {:08X}h, revision {:08X}h, serial {:08X}h",
         vendor, product, revision, serial
     ),
 });

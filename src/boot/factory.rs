@@ -21,7 +21,8 @@ const ANSWER_TIMEOUT: Duration = Duration::from_millis(500);
 enum Step {
     /// All nodes to waiting; a node that was given a node-ID boots with it.
     Leave,
-    /// Who is looked for next? When all were, anybody else.
+    /// Who is looked for next? When all were, anybody else: first one of the same
+    /// kind, which takes less time, then any.
     Next,
     /// Is the node there? It is selected if it is.
     Scan,
@@ -109,7 +110,20 @@ impl Factory {
             while self.place < nodes.len() && !wanted(self.place) {
                 self.place += 1;
             }
-            self.scan = Fastscan::new(nodes.get(self.place).map_or([None; 4], named));
+            let known = match self.place.checked_sub(nodes.len()) {
+                None | Some(0) => nodes.get(self.place).or(nodes.first()),
+                Some(1) => None,
+                Some(_) => {
+                    self.step = Step::Over;
+                    return None;
+                }
+            };
+            let mut known = known.map_or([None; 4], named);
+            if self.place >= nodes.len() {
+                let [.., serial] = &mut known;
+                *serial = None;
+            }
+            self.scan = Fastscan::new(known);
             self.step = Step::Scan;
         }
         let (bytes, time) = match self.step {
@@ -153,12 +167,12 @@ impl Factory {
                     Event::Stranger(address)
                 }
                 // It is not among them.
-                (Verdict::Lost(_), Some(_)) => {
+                (Verdict::Lost(_), _) => {
                     self.place += 1;
                     self.step = Step::Next;
                     return None;
                 }
-                _ => {
+                (Verdict::Nobody, _) => {
                     self.step = Step::Over;
                     return None;
                 }

@@ -92,12 +92,10 @@ impl<const N: usize> NetworkBoot<N> {
             Some(Action::Report(event)) => self.found(event, now),
             Some(action) => self.push(action),
             None => {
-                if self.factory.is_over() {
-                    for node in &mut self.nodes {
-                        node.not_found(now);
-                    }
-                }
-                return false;
+                let over = self.factory.is_over();
+                let mut nodes = self.nodes.iter_mut();
+                // It is told before what follows from it.
+                return over && nodes.any(|node| node.not_found(now));
             }
         }
         true

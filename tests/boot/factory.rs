@@ -3,8 +3,9 @@
 use crate::networks::{network, unconfigured};
 use crate::rig::{Rig, id, ms};
 use canmaster::boot::Event;
-use canmaster::lss::LssAddress;
+use canmaster::lss::{LssAddress, LssSlave};
 use canmaster::network::Network;
+use canmaster::network::sample::SIX_EPOS4;
 
 /// Node 2 is named by its serial number.
 fn serials() -> &'static Network {
@@ -65,8 +66,67 @@ fn a_drive_that_the_network_does_not_name_gets_no_node_id_and_is_told_of() {
         revision: 0x0170_0000,
         serial: 0x4712,
     };
-    assert!(rig.events.contains(&Event::Stranger(stranger)));
+    // It is named before what follows from its absence.
+    let told: Vec<_> = rig.events.iter().rev().take(3).rev().collect();
+    assert!(matches!(
+        told[..],
+        [Event::Stranger(found), Event::Failed(..), Event::NetworkFailed] if *found == stranger
+    ));
     assert!(rig.fakes[1].lss.is_some());
+}
+
+#[test]
+fn a_stranger_of_another_kind_is_named_too() {
+    let mut rig = Rig::new(serials());
+    let stranger = LssAddress {
+        vendor: 0x15A,
+        product: 2,
+        revision: 3,
+        serial: 4,
+    };
+    rig.fakes[1].lss = Some(LssSlave::new(stranger, None));
+    rig.run_for(ms(20_000));
+    rig.assert_nothing_was_started();
+    assert!(rig.events.contains(&Event::Stranger(stranger)));
+}
+
+#[test]
+fn several_nodes_without_node_id_each_get_their_own_and_one_that_refuses_is_named() {
+    let mut rig = Rig::new(&SIX_EPOS4);
+    for (n, fake) in rig.fakes.iter_mut().enumerate() {
+        unconfigured(fake, 0x2600_0001 + n as u32);
+    }
+    rig.refuses_node_id = Some(4);
+    rig.run_for(ms(10_000));
+    rig.assert_nothing_was_started();
+    for node in [1, 2, 3, 5, 6] {
+        let given = Event::IdGiven {
+            node: id(node),
+            stored: true,
+        };
+        assert!(rig.events.contains(&given), "node {node}");
+        assert_eq!(rig.letter(node), None);
+    }
+    let refused = Event::IdRefused {
+        node: id(4),
+        error: 1,
+        specific: 0,
+    };
+    assert!(rig.events.contains(&refused));
+    assert_eq!(rig.letter(4), Some('B'));
+}
+
+#[test]
+fn a_node_that_boots_late_is_booted_while_others_are_looked_for() {
+    let mut rig = Rig::new(serials());
+    rig.fakes[1].missing = true;
+    rig.run_for(ms(2110));
+    assert_eq!(rig.events.last(), Some(&Event::Scanning));
+    rig.fakes[1].missing = false;
+    rig.fakes[1].set((0x1018, 4), 0x4711);
+    rig.fakes[1].boots_at = Some(rig.now);
+    rig.run_for(ms(1000));
+    assert!(rig.boot.is_ready());
 }
 
 #[test]

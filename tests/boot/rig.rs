@@ -122,6 +122,8 @@ pub(crate) struct Rig {
     pub(crate) events: Vec<Event>,
     pub(crate) sync: bool,
     pub(crate) restarts: Vec<Instant>,
+    /// Nobody takes this node-ID.
+    pub(crate) refuses_node_id: Option<u8>,
 }
 
 impl Rig {
@@ -147,6 +149,7 @@ impl Rig {
             events: Vec::new(),
             sync: false,
             restarts: Vec::new(),
+            refuses_node_id: None,
         }
     }
 
@@ -252,7 +255,13 @@ impl Rig {
         let Some(slave) = &mut self.fakes[n].lss else {
             return;
         };
-        match slave.on_frame(frame, &mut NoStore) {
+        let mut data = frame.padded();
+        if data[0] == 0x11 && Some(data[1]) == self.refuses_node_id {
+            // No node-ID at all.
+            data[1] = 0;
+        }
+        let frame = Frame::full(frame.id(), data);
+        match slave.on_frame(&frame, &mut NoStore) {
             Some(SlaveEvent::Send(answer)) => self.boot.on_frame(&answer, self.now),
             Some(SlaveEvent::Boot(node)) => {
                 self.fakes[n].lss = None;

@@ -147,11 +147,13 @@ impl NodeBoot {
         self.search = allowed && self.node.identity.serial.is_some();
     }
 
-    /// Nobody is looked for any more.
-    pub(super) fn not_found(&mut self, now: Instant) {
-        if self.is_missing() {
+    /// Nobody is looked for any more. Whether it is given up for that.
+    pub(super) fn not_found(&mut self, now: Instant) -> bool {
+        let missing = self.is_missing();
+        if missing {
             self.fail(Status::B, Cause::NoBootUp, now);
         }
+        missing
     }
 
     /// It was reset, or given its node-ID: it boots.
