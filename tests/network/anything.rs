@@ -3,7 +3,7 @@
 
 use canmaster::lss::{
     Answer, ConfigurationResult, Device, LssAddress, LssMaster, LssSlave, Mode, Outcome, Part,
-    Progress, ScanPart, Service, SlaveEvent,
+    Progress, Service, SlaveEvent,
 };
 use canmaster::nmt::{Command, Consumer, Guard, Guarded, Guardian, Node, NodeEvent, State};
 use canmaster::{CobId, Duration, Frame, Instant, NodeId};
@@ -230,7 +230,7 @@ const SERVICES: [Service; 9] = [
     Service::Store,
     Service::Inquire(Part::Serial),
     Service::InquireNodeId,
-    Service::Fastscan([ScanPart::Unknown; 4]),
+    Service::Fastscan([None; 4]),
 ];
 
 /// A service is under way, all its frames sent.
