@@ -46,7 +46,7 @@ impl Status {
     }
 }
 
-/// What happened.
+/// What happened; in words together with what to do about it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Cause {
@@ -90,45 +90,34 @@ pub enum Cause {
     NotOperational,
 }
 
-impl Cause {
-    /// What to do about it.
-    pub const fn advice(&self) -> &'static str {
-        match self {
-            Cause::NotListed => "set bit 0 of 1F81h for it",
-            Cause::NoBootUp => {
-                "check its power supply, the bus wiring and termination, its node-ID and its bit rate"
-            }
-            Cause::Restarts => "check its power supply",
-            Cause::NoAnswer { .. } | Cause::Garbled { .. } => {
-                "check that no other node has the same node-ID, and the wiring"
-            }
-            Cause::Refused { .. } => {
-                "compare the network description with the object dictionary of the drive"
-            }
-            Cause::Mismatch { .. } => {
-                "connect the drive that the network names, or name this one in the network"
-            }
-            Cause::NoState => "check the heartbeat time or the guard time that it was given",
-            Cause::NoHeartbeat | Cause::NotOperational => {
-                "check the drive's error memory (1003h) and the wiring"
-            }
-        }
-    }
-}
-
 in_words!(Cause {
-    Cause::NotListed => ("not in the list of this master (1F81h)"),
-    Cause::NoBootUp => ("no boot-up frame"),
-    Cause::Restarts => ("restarts again and again"),
-    Cause::NoAnswer { at } => ("no answer to the access to {}", at),
-    Cause::Refused { at, code } => ("access to {} refused: {}", at, code),
-    Cause::Garbled { at } => ("wrong answer to the access to {}", at),
-    Cause::Mismatch { at, expected, found } => (
-        "{} is {:08X}h, expected {:08X}h", at, found, expected
+    Cause::NotListed => ("not in the list of this master; set bit 0 of 1F81h for it"),
+    Cause::NoBootUp => (
+        "no boot-up frame; check its power supply, the bus wiring and termination, its node-ID and its bit rate"
     ),
-    Cause::NoState => ("does not tell its NMT state"),
-    Cause::NoHeartbeat => ("no heartbeat after the configuration"),
-    Cause::NotOperational => ("not operational after NMT start"),
+    Cause::Restarts => ("restarts again and again; check its power supply"),
+    Cause::NoAnswer { at } => (
+        "no answer to the access to {}; check that no other node has the same node-ID, and the wiring", at
+    ),
+    Cause::Refused { at, code } => (
+        "access to {} refused: {}; compare the network description with the object dictionary of the drive", at, code
+    ),
+    Cause::Garbled { at } => (
+        "wrong answer to the access to {}; check that no other node has the same node-ID, and the wiring", at
+    ),
+    Cause::Mismatch { at, expected, found } => (
+        "{} is {:08X}h, expected {:08X}h; connect the drive that the network names, or name this one in the network",
+        at, found, expected
+    ),
+    Cause::NoState => (
+        "does not tell its NMT state; check the heartbeat time or the guard time that it was given"
+    ),
+    Cause::NoHeartbeat => (
+        "no heartbeat after the configuration; check the drive's error memory (1003h) and the wiring"
+    ),
+    Cause::NotOperational => (
+        "not operational after NMT start; check the drive's error memory (1003h) and the wiring"
+    ),
 });
 
 /// A node that was not booted.
@@ -142,7 +131,7 @@ pub struct Failure {
 
 in_words!(Failure {
     Failure { status, cause } => (
-        "{} (boot status {}); {}", cause, status.letter(), cause.advice()
+        "boot status {}: {}", status.letter(), cause
     ),
 });
 

@@ -113,7 +113,8 @@ fn another_device_is_refused_before_anything_is_written() {
     assert_eq!(status, Status::M);
     assert_eq!(
         cause.to_string(),
-        "1018h:02 is 63500000h, expected 61500000h"
+        "1018h:02 is 63500000h, expected 61500000h; connect the drive that the network names, \
+         or name this one in the network"
     );
     assert_eq!(rig.fakes[4].written, []);
 }

@@ -15,7 +15,7 @@ fn results_are_told_in_words() {
     assert_eq!(words(1), "booted");
     assert_eq!(
         words(2),
-        "no boot-up frame (boot status B); check its power supply, the bus wiring and \
+        "boot status B: no boot-up frame; check its power supply, the bus wiring and \
          termination, its node-ID and its bit rate"
     );
 }
