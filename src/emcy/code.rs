@@ -1,5 +1,6 @@
 //! Emergency error codes: CiA 301, 7.2.7.1, table 26; CiA 402-2; EPOS4.
 
+use super::texts;
 use core::fmt;
 
 /// How the master takes an emergency.
@@ -58,27 +59,13 @@ impl EmcyCode {
     /// The code in words: exactly if it is known, else by its range; `None` if
     /// neither is.
     pub fn meaning(self) -> Option<&'static str> {
-        self.exact().or_else(|| self.range())
+        texts::of(self.0)
     }
 
     /// What the code means, or that nobody knows.
     pub fn text(self) -> &'static str {
-        self.meaning().unwrap_or(UNKNOWN)
-    }
-
-    fn exact(self) -> Option<&'static str> {
-        TEXTS
-            .binary_search_by_key(&self.0, |&(code, _)| code)
-            .ok()
-            .and_then(|position| TEXTS.get(position))
-            .map(|&(_, text)| text)
-    }
-
-    fn range(self) -> Option<&'static str> {
-        RANGES
-            .iter()
-            .find(|(first, last, _)| (*first..=*last).contains(&self.0))
-            .map(|&(_, _, text)| text)
+        self.meaning()
+            .unwrap_or("unknown error, treated as a fault")
     }
 }
 
@@ -97,112 +84,10 @@ impl defmt::Format for EmcyCode {
     }
 }
 
-const UNKNOWN: &str = "unknown error, treated as a fault";
-
-/// Codes with a text of their own, ascending.
-const TEXTS: &[(u16, &str)] = &[
-    (0x0000, "error reset or no error"),
-    (0x1000, "generic error"),
-    (0x1090, "firmware incompatible"),
-    (0x2310, "overcurrent"),
-    (0x2320, "power stage protection"),
-    (0x3210, "supply overvoltage"),
-    (0x3220, "supply undervoltage"),
-    (0x4210, "power stage too hot"),
-    (0x4380, "motor too hot"),
-    (0x5113, "logic supply voltage too low"),
-    (0x5280, "hardware defect"),
-    (0x5281, "hardware incompatible"),
-    (0x6080, "sign of life error"),
-    (0x6081, "extension 1 watchdog"),
-    (0x6320, "software parameter error"),
-    (0x6380, "persistent parameters corrupt"),
-    (0x7320, "position sensor error"),
-    (0x7380, "position sensor breach"),
-    (0x7381, "position sensor resolution error"),
-    (0x7382, "position sensor index error"),
-    (0x7388, "Hall sensor error"),
-    (0x7389, "Hall sensor not found"),
-    (0x738A, "Hall angle detection error"),
-    (0x738C, "SSI sensor error"),
-    (0x738D, "SSI sensor frame error"),
-    (0x8110, "CAN overrun, objects lost"),
-    (0x8111, "CAN receive queue overrun"),
-    (0x8120, "CAN controller error passive"),
-    (0x8130, "heartbeat or life guarding of the master lost"),
-    (0x8140, "recovered from bus-off"),
-    (0x8150, "another node sends on one of its identifiers"),
-    (0x81FD, "CAN bus-off"),
-    (0x81FE, "CAN receive queue overflow"),
-    (0x81FF, "CAN transmit queue overflow"),
-    (0x8210, "PDO shorter than mapped, not processed"),
-    (0x8220, "PDO longer than mapped"),
-    (
-        0x8230,
-        "destination object of a multiplexed PDO not available",
-    ),
-    (0x8240, "SYNC with an unexpected data length"),
-    (0x8250, "RPDO did not arrive in time"),
-    (0x8611, "following error"),
-    (0x8A80, "negative limit switch"),
-    (0x8A81, "positive limit switch"),
-    (0x8A82, "software position limit"),
-    (0x8A88, "safe torque off active"),
-    (0xFF01, "system overloaded"),
-    (0xFF02, "watchdog"),
-    (0xFF0B, "system peak overcurrent"),
-    (0xFF10, "controller gain error"),
-];
-
-/// What the remaining codes are about. The narrow ranges come first.
-const RANGES: &[(u16, u16, &str)] = &[
-    (0x1080, 0x1088, "initialisation error"),
-    (0x5480, 0x5483, "hardware error"),
-    (0x6180, 0x61F0, "internal software error"),
-    (0x7390, 0x7392, "sensor error"),
-    (0xFF11, 0xFF24, "auto tuning or sensor configuration error"),
-    (0x1000, 0x10FF, "generic error"),
-    (0x2000, 0x20FF, "current"),
-    (0x2100, 0x21FF, "current, input side"),
-    (0x2200, 0x22FF, "current inside the device"),
-    (0x2300, 0x23FF, "current, output side"),
-    (0x3000, 0x30FF, "voltage"),
-    (0x3100, 0x31FF, "mains voltage"),
-    (0x3200, 0x32FF, "voltage inside the device"),
-    (0x3300, 0x33FF, "output voltage"),
-    (0x4000, 0x40FF, "temperature"),
-    (0x4100, 0x41FF, "ambient temperature"),
-    (0x4200, 0x42FF, "device temperature"),
-    (0x4300, 0x43FF, "drive temperature"),
-    (0x5000, 0x5FFF, "device hardware"),
-    (0x6000, 0x60FF, "device software"),
-    (0x6100, 0x61FF, "internal software"),
-    (0x6200, 0x62FF, "user software"),
-    (0x6300, 0x63FF, "data set"),
-    (0x7000, 0x7FFF, "additional modules"),
-    (0x8000, 0x80FF, "monitoring"),
-    (0x8100, 0x81FF, "communication"),
-    (0x8200, 0x82FF, "protocol error"),
-    (0x8300, 0x83FF, "torque control"),
-    (0x8400, 0x84FF, "velocity speed controller"),
-    (0x8500, 0x85FF, "position controller"),
-    (0x8600, 0x86FF, "positioning controller"),
-    (0x8700, 0x87FF, "synchronisation controller"),
-    (0x9000, 0x90FF, "external error"),
-    (0xF000, 0xF0FF, "additional functions"),
-    (0xFF00, 0xFFFF, "device specific"),
-];
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use std::string::ToString;
-
-    #[test]
-    fn the_texts_ascend() {
-        assert!(TEXTS.windows(2).all(|pair| pair[0].0 < pair[1].0));
-        assert!(RANGES.iter().all(|(first, last, _)| first <= last));
-    }
 
     #[test]
     fn only_known_harmless_codes_are_no_faults() {

@@ -5,6 +5,7 @@ mod code;
 mod history;
 mod producer;
 mod register;
+mod texts;
 
 pub use cob_id::EmcyCobId;
 pub use code::{Class, EmcyCode};

@@ -27,7 +27,7 @@ mod app {
         duties::{act, begin, obey, order_boot, serve},
         filters::{self, Handler},
         leds,
-        log::{Log, News, UPTIME_MS},
+        log::{self, Log, News, UPTIME_MS},
         own_node::{Order, OwnNode, Storage},
         report::{publish, tell},
         roll::{self, Task},
@@ -549,11 +549,7 @@ mod app {
         let local = cx.local;
         let mut wake = wake::reader();
         let mut log = Log::new(NETWORK);
-        defmt::info!(
-            "canmaster {=str}, started by: {=str}",
-            env!("CARGO_PKG_VERSION"),
-            local.reset_cause.text()
-        );
+        log::started(*local.reset_cause);
         defmt::info!(
             "silent for {=u32} ms, so that drives left running come to rest",
             NETWORK.master.silence.as_millis()

@@ -11,7 +11,7 @@ use canmaster::{
 };
 use core::sync::atomic::{AtomicU32, Ordering};
 use defmt::{error, info, warn};
-use nucleo_g474re::can::ErrorState;
+use nucleo_g474re::{can::ErrorState, reset_cause::ResetCause};
 
 /// Milliseconds since the start, for the log; `network` counts them.
 pub(crate) static UPTIME_MS: AtomicU32 = AtomicU32::new(0);
@@ -27,6 +27,25 @@ macro_rules! fault {
             error!($($words)+);
         }
     };
+}
+
+/// The first line.
+pub(crate) fn started(cause: ResetCause) {
+    let cause = match cause {
+        ResetCause::Power => defmt::intern!("power-on or brown-out"),
+        ResetCause::Pin => defmt::intern!("reset pin"),
+        ResetCause::Watchdog => defmt::intern!("watchdog: a task hung, or the firmware panicked"),
+        ResetCause::WindowWatchdog => defmt::intern!("window watchdog"),
+        ResetCause::Software => defmt::intern!("software"),
+        ResetCause::LowPower => defmt::intern!("low-power mode"),
+        ResetCause::OptionBytes => defmt::intern!("option bytes loaded"),
+        ResetCause::Unknown => defmt::intern!("unknown"),
+    };
+    info!(
+        "canmaster {=str}, started by: {=istr}",
+        env!("CARGO_PKG_VERSION"),
+        cause
+    );
 }
 
 /// What `network` has to say.

@@ -47,19 +47,3 @@ impl From<ResetReason> for ResetCause {
         }
     }
 }
-
-impl ResetCause {
-    /// The cause in words.
-    pub const fn text(self) -> &'static str {
-        match self {
-            ResetCause::Power => "power-on or brown-out",
-            ResetCause::Pin => "reset pin",
-            ResetCause::Watchdog => "watchdog: a task hung, or the firmware panicked",
-            ResetCause::WindowWatchdog => "window watchdog",
-            ResetCause::Software => "software",
-            ResetCause::LowPower => "low-power mode",
-            ResetCause::OptionBytes => "option bytes loaded",
-            ResetCause::Unknown => "unknown",
-        }
-    }
-}
