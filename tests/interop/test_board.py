@@ -121,8 +121,13 @@ class Board(OnTheBus):
         self.aborts(NO_SUCH_OBJECT, self.sdo.upload, 0x5FFF, 0)
         self.aborts(NO_SUCH_OBJECT, block_read, self.sdo, 0x5FFF, 0)
 
-    def test_the_heartbeat_says_pre_operational(self):
+    def test_the_heartbeat_says_which_state_nmt_has_put_it_into(self):
         self.await_state(self.board, "PRE-OPERATIONAL")
+        self.board.nmt.state = "STOPPED"
+        self.await_state(self.board, "STOPPED")
+        self.board.nmt.state = "PRE-OPERATIONAL"
+        self.await_state(self.board, "PRE-OPERATIONAL")
+        self.assertEqual(self.sdo.upload(0x1008, 0), NAME)
 
     def test_the_emergency_of_a_missing_drive_was_seen(self):
         emergency = self.await_emergency(self.witnessed, BOOT_FAILED)

@@ -1,6 +1,7 @@
 """canopen as a client of the drives, beside the master.
 
-Drive 4 is missing, so that the master leaves the others in pre-operational.
+Drive 4 is missing, so that the master leaves the others in pre-operational. In its
+place there is one from the factory, which the master does not know.
 """
 
 import struct
@@ -14,6 +15,7 @@ DEVICE_TYPE = 0x0002_0192
 NAME = b"EPOS4"
 VENDOR = 0x0000_00FB
 PRODUCT = 0x6150_0000
+REVISION = 0x0170_0000
 
 NO_SUCH_OBJECT = 0x0602_0000
 READ_ONLY = 0x0601_0002
@@ -22,12 +24,16 @@ HEARTBEAT_LOST = 0x8130
 # Nobody has this node-ID.
 STRANGER = 100
 NEW_ID = 40
+# What the drive from the factory gets.
+FIRST_ID = 50
+# Seconds on the wall after which nobody answers to a question of fastscan.
+NOBODY = 0.5
 
 
 class Drives(OnTheBus):
     """SDO, heartbeat, EMCY and LSS of the drives."""
 
-    options = ("--without", "4")
+    options = ("--without", "4", "--stranger")
 
     @classmethod
     def setUpClass(cls):
@@ -88,3 +94,26 @@ class Drives(OnTheBus):
         drive.nmt.state = "RESET COMMUNICATION"
         renamed.nmt.wait_for_bootup(timeout=PATIENCE)
         self.assertEqual(number(renamed.sdo.upload(0x1018, 4)), address[3])
+
+    def test_a_drive_from_the_factory_is_found_and_gets_its_node_id_by_lss(self):
+        # The master looked for drive 4 and has left this one alone.
+        self.machine.await_words("stays without node-ID")
+        lss = self.network.lss
+        lss.RESPONSE_TIMEOUT = NOBODY
+        found, address = lss.fast_scan()
+        self.assertTrue(found)
+        self.assertEqual(address[:3], [VENDOR, PRODUCT, REVISION])
+        lss.RESPONSE_TIMEOUT = PATIENCE
+        self.assertEqual(lss.inquire_node_id(), 0xFF)
+        lss.configure_bit_timing(0)
+        lss.configure_node_id(FIRST_ID)
+        lss.store_configuration()
+        drive = self.node(FIRST_ID)
+        lss.send_switch_state_global(lss.WAITING_STATE)
+        drive.nmt.wait_for_bootup(timeout=PATIENCE)
+        self.assertEqual(drive.sdo.upload(0x1008, 0), NAME)
+        self.assertEqual(number(drive.sdo.upload(0x1018, 4)), address[3])
+        drive.sdo.download(0x1017, 0, struct.pack("<H", 100))
+        self.await_state(drive, "PRE-OPERATIONAL")
+        lss.RESPONSE_TIMEOUT = NOBODY
+        self.assertFalse(lss.fast_scan()[0], "nobody is left")
