@@ -44,65 +44,76 @@ impl<const N: usize> NetworkBoot<N> {
     /// 1F80h, bit 2, leaves to the application is ordered.
     ///
     /// # Errors
-    /// See [`Refusal`]; nothing was sent.
+    /// As [`may_request`](Self::may_request); nothing was sent.
     pub fn request(&mut self, control: NodeControl, now: Instant) -> Result<(), Refusal> {
+        self.may_request(control)?;
         let NodeControl { command, target } = control;
-        let to_master = target == Target::Node(self.network.master.node);
-        let known = |boot: &NodeBoot| target.includes(boot.node().id);
-        if !to_master && !self.nodes.iter().any(known) {
-            return Err(Refusal::UnknownNode);
-        }
-        match (command, self.phase) {
-            (Command::Other(_), _) => Err(Refusal::UnknownCommand),
-            (
-                Command::ResetNode | Command::ResetCommunication,
-                Phase::Booting
-                | Phase::AwaitingOrder
-                | Phase::Synchronising { .. }
-                | Phase::Starting
-                | Phase::Running
-                | Phase::Stopped
-                | Phase::Failed,
-            ) if target == Target::All => {
+        match target {
+            Target::All if is_reset(command) => {
                 self.broadcast(command);
                 self.ran = false;
                 self.begin_all(false, now);
-                Ok(())
             }
-            (_, Phase::Failed | Phase::Stopped) => Err(Refusal::Halted),
-            (Command::Start, Phase::AwaitingOrder) if target == Target::All || to_master => {
-                if !self.mandatory_up() {
-                    return Err(Refusal::MandatoryMissing);
-                }
+            _ if self.phase == Phase::AwaitingOrder => {
                 self.ordered = true;
                 self.synchronise(now);
-                Ok(())
             }
-            (_, Phase::Running) if !to_master => self.request_running(control, now),
-            _ => Err(Refusal::Booting),
+            Target::Node(id) if is_reset(command) => {
+                let boot_time = self.boot_time;
+                for node in self.nodes.iter_mut().filter(|boot| boot.node().id == id) {
+                    node.reset_by_request(command, boot_time, now);
+                }
+            }
+            _ => self.command(control, now),
         }
+        Ok(())
     }
 
-    fn request_running(&mut self, control: NodeControl, now: Instant) -> Result<(), Refusal> {
+    /// Whether a [`request`](Self::request) would be carried out now.
+    ///
+    /// # Errors
+    /// See [`Refusal`].
+    pub fn may_request(&self, control: NodeControl) -> Result<(), Refusal> {
         let NodeControl { command, target } = control;
-        if command == Command::Start && !self.mandatory_up() {
-            return Err(Refusal::MandatoryMissing);
-        }
-        if let Target::Node(id) = target {
-            let boot_time = self.boot_time;
-            let node = self.nodes.iter_mut().find(|boot| boot.node().id == id);
-            let node = node.ok_or(Refusal::UnknownNode)?;
-            if matches!(command, Command::ResetNode | Command::ResetCommunication) {
-                node.reset_by_request(command, boot_time, now);
+        let to_all = target == Target::All;
+        let to_master = target == Target::Node(self.network.master.node);
+        let mut nodes = self.nodes.iter();
+        let node = nodes.find(|boot| target.includes(boot.node().id));
+        Err(match (self.phase, node) {
+            _ if matches!(command, Command::Other(_)) => Refusal::UnknownCommand,
+            (_, None) if !to_master => Refusal::UnknownNode,
+            // The master does not speak.
+            (Phase::NotMaster | Phase::Silent { .. } | Phase::BusOff { .. }, _) => Refusal::Booting,
+            // This leads out of everything else.
+            _ if to_all && is_reset(command) => return Ok(()),
+            (Phase::Failed | Phase::Stopped, _) => Refusal::Halted,
+            (Phase::AwaitingOrder, _) if command == Command::Start && (to_all || to_master) => {
+                if self.mandatory_up() {
+                    return Ok(());
+                }
+                Refusal::MandatoryMissing
+            }
+            (Phase::Running, Some(_)) if command == Command::Start && !self.mandatory_up() => {
+                Refusal::MandatoryMissing
+            }
+            // A stopped node has no SDO: its boot-up would fail.
+            (Phase::Running, Some(_))
+                if to_all
+                    && command == Command::Stop
+                    && !self.nodes.iter().all(NodeBoot::is_settled) =>
+            {
+                Refusal::Booting
+            }
+            (Phase::Running, Some(node)) if to_all || is_reset(command) || node.is_up() => {
                 return Ok(());
             }
-            if !node.is_up() {
-                return Err(Refusal::NotBooted);
-            }
-        } else if command == Command::Stop && !self.nodes.iter().all(NodeBoot::is_settled) {
-            // A stopped node has no SDO: its boot-up would fail.
-            return Err(Refusal::Booting);
-        }
+            (Phase::Running, Some(_)) => Refusal::NotBooted,
+            _ => Refusal::Booting,
+        })
+    }
+
+    fn command(&mut self, control: NodeControl, now: Instant) {
+        let NodeControl { command, target } = control;
         let included = |boot: &&mut NodeBoot| target.includes(boot.node().id);
         for node in self.nodes.iter_mut().filter(included) {
             node.hold(command != Command::Start);
@@ -114,6 +125,9 @@ impl<const N: usize> NetworkBoot<N> {
         if command != Command::Start {
             self.push(Action::Send(control.frame()));
         }
-        Ok(())
     }
+}
+
+fn is_reset(command: Command) -> bool {
+    matches!(command, Command::ResetNode | Command::ResetCommunication)
 }

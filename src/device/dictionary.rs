@@ -201,7 +201,12 @@ impl<const N: usize> Dictionary<N> {
     }
 
     /// 1F82h (CiA 302-2).
-    fn request_nmt(&mut self, node: Option<NodeId>, value: u8) -> Result<(), AbortCode> {
+    fn request_nmt(
+        &mut self,
+        board: &mut impl Board,
+        node: Option<NodeId>,
+        value: u8,
+    ) -> Result<(), AbortCode> {
         let command = match value {
             4 => Command::Stop,
             5 => Command::Start,
@@ -210,18 +215,22 @@ impl<const N: usize> Dictionary<N> {
             127 => Command::EnterPreOperational,
             _ => return Err(AbortCode::VALUE_RANGE),
         };
-        let myself = node == Some(self.network.master.node);
-        let forbidden = if myself {
+        let target = node.map_or(Target::All, Target::Node);
+        let control = NodeControl { command, target };
+        if node != Some(self.network.master.node) {
+            self.may_request(board, control)?;
+        } else if self.axes_enabled && command != Command::Start {
             // The axes would be left without their master.
-            self.axes_enabled && command != Command::Start
-        } else {
-            !self.is_master
-        };
-        if forbidden {
             return Err(AbortCode::DEVICE_STATE);
         }
-        let target = node.map_or(Target::All, Target::Node);
-        self.push(Event::Nmt(NodeControl { command, target }))
+        self.push(Event::Nmt(control))
+    }
+
+    fn may_request(&self, board: &mut impl Board, control: NodeControl) -> Result<(), AbortCode> {
+        if !self.is_master {
+            return Err(AbortCode::DEVICE_STATE);
+        }
+        board.may_request(control)
     }
 
     /// 1010h and 1011h: the device does nothing else for some 25 ms, so that no
@@ -411,10 +420,14 @@ impl<B: Board, const N: usize> ObjectDictionary for View<'_, B, N> {
             }
             Item::Save => return dictionary.store(self.board, (number, SAVE), false),
             Item::Restore => return dictionary.store(self.board, (number, LOAD), true),
-            Item::NmtRequest => return dictionary.request_nmt(node, number as u8),
+            Item::NmtRequest => return dictionary.request_nmt(self.board, node, number as u8),
             Item::Configure if number != CONFIGURE => return Err(AbortCode::CANNOT_STORE),
-            Item::Configure if !dictionary.is_master => return Err(AbortCode::DEVICE_STATE),
-            Item::Configure => return dictionary.push(Event::Configure(target)),
+            Item::Configure => {
+                // It is configured whenever it boots.
+                let command = Command::ResetCommunication;
+                dictionary.may_request(self.board, NodeControl { command, target })?;
+                return dictionary.push(Event::Configure(target));
+            }
             Item::Clock => {
                 let bytes = value.bytes().try_into().map_err(|_| AbortCode::GENERAL)?;
                 let time = TimeOfDay::decode(bytes).ok_or(AbortCode::VALUE_RANGE)?;

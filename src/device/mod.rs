@@ -97,6 +97,13 @@ pub trait Board {
     /// 0 and refuse with 08000022h.
     fn can_save(&self) -> bool;
 
+    /// Whether an NMT command that a client requests (1F82h), or the reset that
+    /// configures a node again (1F25h), would be carried out now.
+    ///
+    /// # Errors
+    /// What the client is told: 08000022h if it would not.
+    fn may_request(&mut self, control: NodeControl) -> Result<(), AbortCode>;
+
     /// The bytes of a TPDO of a node as it last came, zeros before.
     fn tpdo(&mut self, node: NodeId, number: u8) -> [u8; MAX_DATA];
 

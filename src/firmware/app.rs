@@ -592,6 +592,7 @@ mod app {
             let mut patience = design::CONFIGURATOR_PERIOD;
             while serve(
                 own,
+                boot,
                 local.store,
                 local.sync_period,
                 local.requests,

@@ -23,6 +23,7 @@ use rtic::Mutex;
 /// there was neither.
 pub(crate) fn serve(
     own: &mut OwnNode,
+    boot: &NetworkBoot<AXES>,
     store: &mut Option<Storage>,
     period: &mut timers::SyncPeriod,
     requests: &mut Consumer<'static, Frame>,
@@ -39,6 +40,7 @@ pub(crate) fn serve(
         .lock(|queue| queue.len() < design::OWN_FRAMES);
     let board = &mut Mirror {
         network: own.network(),
+        boot,
         store,
         od: &mut shared.od,
         commands: &mut shared.commands,
@@ -106,9 +108,8 @@ pub(crate) fn order_boot(
         }
         _ => return false,
     };
-    if let Err(refusal) = boot.request(control, now) {
-        defmt::warn!("NMT request refused: {}", refusal);
-    }
+    // The client was refused what it would refuse (`Mirror::may_request`).
+    let _ = boot.request(control, now);
     true
 }
 

@@ -11,7 +11,7 @@
 use crate::{control::Control, log::News};
 use canmaster::{
     Frame, NodeId,
-    boot::Event,
+    boot::{Event, NetworkBoot},
     design::{self, AXES},
     device::{self, Description, Device, Identity, MasterError, Setting, Settings},
     emcy::EmcyCode,
@@ -71,6 +71,7 @@ pub(crate) enum Order {
 /// and what each axis was last told.
 pub(crate) struct Mirror<'a, O, C> {
     pub(crate) network: &'static Network,
+    pub(crate) boot: &'a NetworkBoot<AXES>,
     pub(crate) store: &'a mut Option<Storage>,
     pub(crate) od: &'a mut O,
     pub(crate) commands: &'a mut C,
@@ -88,6 +89,12 @@ where
 
     fn can_save(&self) -> bool {
         self.store.is_some()
+    }
+
+    fn may_request(&mut self, control: NodeControl) -> Result<(), AbortCode> {
+        // Why not, the boot status says (2F00h, 2F01h).
+        let allowed = self.boot.may_request(control);
+        allowed.map_err(|_| AbortCode::DEVICE_STATE)
     }
 
     fn tpdo(&mut self, node: NodeId, number: u8) -> [u8; 8] {

@@ -321,3 +321,33 @@ fn every_answer_of_lss_in_every_state() {
         }
     }
 }
+
+#[test]
+fn whether_a_request_would_be_carried_out_is_known_before() {
+    let mut carried_out = 0;
+    for (name, _, state) in STATES {
+        for command in [0x01, 0x02, 0x80, 0x81, 0x82, 0x33] {
+            for node in [0, 1, 2, 9, 127] {
+                let command = Command::from_code(command);
+                let control = match node {
+                    0 => NodeControl::all(command),
+                    node => NodeControl::node(command, crate::rig::id(node)),
+                };
+                let mut rig = rest(*state);
+                let foretold = rig.boot.may_request(control);
+                let told = rig.boot.request(control, rig.now);
+                assert_eq!(foretold, told, "{name}: {control:?}");
+                rig.run();
+                if told.is_err() {
+                    assert_eq!(
+                        (rig.sent.len(), rig.events.len()),
+                        (0, 0),
+                        "{name}: {control:?}"
+                    );
+                }
+                carried_out += u32::from(told.is_ok());
+            }
+        }
+    }
+    assert!(carried_out > 50, "{carried_out}");
+}

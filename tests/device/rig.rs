@@ -3,7 +3,7 @@
 use canmaster::boot::Event as Step;
 use canmaster::device::{Board, Description, Device, Event, Identity};
 use canmaster::network::sample::SIX_EPOS4;
-use canmaster::nmt::State;
+use canmaster::nmt::{NodeControl, State};
 use canmaster::sdo::AbortCode;
 use canmaster::sync::SyncLimits;
 use canmaster::time::{Duration, Instant};
@@ -40,6 +40,7 @@ pub(crate) fn ms(ms: u64) -> Instant {
 pub(crate) struct Fake {
     pub(crate) saved: Option<Vec<u8>>,
     pub(crate) refuses: Option<AbortCode>,
+    pub(crate) refuses_requests: Option<AbortCode>,
     pub(crate) can_save: bool,
 }
 
@@ -56,6 +57,10 @@ impl Board for Fake {
 
     fn can_save(&self) -> bool {
         self.can_save
+    }
+
+    fn may_request(&mut self, _: NodeControl) -> Result<(), AbortCode> {
+        self.refuses_requests.map_or(Ok(()), Err)
     }
 
     fn tpdo(&mut self, node: NodeId, number: u8) -> [u8; 8] {

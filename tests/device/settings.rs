@@ -160,6 +160,26 @@ fn nmt_is_requested() {
 }
 
 #[test]
+fn a_request_that_would_not_be_carried_out_is_refused() {
+    let mut b = Bench::new();
+    b.board.refuses_requests = Some(AbortCode::DEVICE_STATE);
+    for sub in [3, 0x80] {
+        for value in [4, 5, 6, 7, 127] {
+            let refused = b.write_u8(0x1F82, sub, value);
+            assert_eq!(refused, Err(AbortCode::DEVICE_STATE));
+        }
+        let refused = b.write(0x1F25, sub, b"conf");
+        assert_eq!(refused, Err(AbortCode::DEVICE_STATE));
+    }
+    // What is no request at all is told first.
+    assert_eq!(b.write_u8(0x1F82, 3, 1), Err(AbortCode::VALUE_RANGE));
+    assert_eq!(b.write(0x1F25, 3, b"fnoc"), Err(AbortCode::CANNOT_STORE));
+    assert_eq!(b.events(), []);
+    // The board decides for others only.
+    assert_eq!(b.write_u8(0x1F82, 127, 4), Ok(()));
+}
+
+#[test]
 fn events_that_nobody_fetches_are_refused_at_last() {
     let mut b = Bench::new();
     for _ in 0..4 {

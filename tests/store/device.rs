@@ -4,7 +4,7 @@ use crate::flash::{Flash, Torn};
 use crate::open;
 use canmaster::device::{Board, Description, Device, Identity};
 use canmaster::network::sample::SIX_EPOS4;
-use canmaster::nmt::State;
+use canmaster::nmt::{NodeControl, State};
 use canmaster::sdo::AbortCode;
 use canmaster::store::{CAPACITY, Store};
 use canmaster::sync::SyncLimits;
@@ -37,6 +37,10 @@ impl Board for WithFlash {
 
     fn can_save(&self) -> bool {
         true
+    }
+
+    fn may_request(&mut self, _: NodeControl) -> Result<(), AbortCode> {
+        Ok(())
     }
 
     fn tpdo(&mut self, _: NodeId, _: u8) -> [u8; 8] {
