@@ -21,6 +21,9 @@ const HEARTBEAT: u16 = 0x77F;
 const EMCY: u16 = 0x0FF;
 const STOPPED: u8 = 0x04;
 
+/// "conf".
+const CONFIGURE: u32 = u32::from_le_bytes(*b"conf");
+
 fn client(scenario: Scenario) -> Client<'static> {
     let world = World::new(image(), scenario.unattended()).unwrap();
     Client::new(world, MASTER)
@@ -145,6 +148,15 @@ fn nmt_commands_from_the_bus_are_obeyed_while_no_axis_is_enabled() {
         client.listen(AWAKE);
         assert!(client.heard_from(HEARTBEAT).contains(&vec![0]));
         assert_eq!(client.number(0x1017, 0).unwrap(), 50);
+    }
+    // Drives that are not there are not commanded.
+    for (index, sub, value, bytes) in [
+        (0x1F82, 1, 5, 1),
+        (0x1F82, 99, 4, 1),
+        (0x1F25, 1, CONFIGURE, 4),
+    ] {
+        let request = client.put(index, sub, value, bytes);
+        refused(request, AbortCode::DEVICE_STATE);
     }
     // The same by 1F82h.
     client.put(0x1F82, 127, 7, 1).unwrap();
