@@ -72,19 +72,23 @@ impl Sender {
         self.sending
     }
 
-    /// The next segment of the block; `None` if it is complete. `read` fills
-    /// the buffer from an offset on and returns how many bytes there were and
-    /// whether they are the last.
+    /// The offset of the next segment of the block; `None` if it is complete.
+    pub(super) fn next_offset(&self) -> Result<Option<u32>, AbortCode> {
+        match self.sending {
+            true => self.offset(self.sequence).map(Some),
+            false => Ok(None),
+        }
+    }
+
+    /// The next segment of the block: the first `len` bytes of `data`, which
+    /// belong at [`next_offset`](Sender::next_offset).
     pub(super) fn segment(
         &mut self,
-        read: impl FnOnce(u32, &mut [u8]) -> Result<(usize, bool), AbortCode>,
-    ) -> Result<Option<BlockSegment>, AbortCode> {
-        if !self.sending {
-            return Ok(None);
-        }
+        data: [u8; SEGMENT_MAX],
+        len: usize,
+        last: bool,
+    ) -> Result<BlockSegment, AbortCode> {
         let offset = self.offset(self.sequence)?;
-        let mut data = [0; SEGMENT_MAX];
-        let (len, last) = read(offset, &mut data)?;
         let bytes = data.get(..len).ok_or(AbortCode::GENERAL)?;
         if len < SEGMENT_MAX && !last {
             return Err(AbortCode::GENERAL);
@@ -97,11 +101,11 @@ impl Sender {
         self.sequence += 1;
         self.tail = last.then_some(len as u8);
         self.sending = !last && self.sequence < self.block_size;
-        Ok(Some(BlockSegment {
+        Ok(BlockSegment {
             last,
             sequence: self.sequence,
             data,
-        }))
+        })
     }
 
     /// The receiver has the first `sequence` segments of the block and wants
@@ -154,6 +158,8 @@ pub(super) struct Receiver {
     complete: bool,
     use_crc: bool,
     crc: Crc16,
+    /// The block has come to its end.
+    over: bool,
     stalled: bool,
     /// Segments out of sequence since the last one in sequence.
     stray: u16,
@@ -168,6 +174,7 @@ impl Receiver {
             complete: false,
             use_crc,
             crc: Crc16::new(),
+            over: false,
             stalled: false,
             stray: 0,
         }
@@ -183,34 +190,38 @@ impl Receiver {
         self.block_size
     }
 
-    /// Takes in a segment; hands the one before it to `deliver`. Returns the
-    /// sequence number to acknowledge where the block is over. A segment out
-    /// of sequence is discarded with all that follow it in the block.
+    /// Takes in a segment and gives out the one before it, which is not the last.
+    /// A segment out of sequence is discarded with all that follow it in the
+    /// block.
     ///
     /// # Errors
-    /// What `deliver` says; 05040003h if nothing but such segments comes.
+    /// 05040003h if nothing but such segments comes.
     pub(super) fn segment(
         &mut self,
         segment: BlockSegment,
-        deliver: impl FnOnce(&[u8]) -> Result<(), AbortCode>,
-    ) -> Result<Option<u8>, AbortCode> {
+    ) -> Result<Option<[u8; SEGMENT_MAX]>, AbortCode> {
         self.stalled = false;
-        if segment.sequence == self.sequence + 1 {
-            if let Some(held) = self.held.take() {
-                self.crc = self.crc.update(&held);
-                deliver(&held)?;
+        self.over = segment.last || segment.sequence >= self.block_size;
+        if segment.sequence != self.sequence + 1 {
+            if self.stray >= STRAY_MAX {
+                return Err(AbortCode::SEQUENCE_NUMBER);
             }
-            self.held = Some(segment.data);
-            self.sequence = segment.sequence;
-            self.complete = segment.last;
-            self.stray = 0;
-        } else if self.stray < STRAY_MAX {
             self.stray += 1;
-        } else {
-            return Err(AbortCode::SEQUENCE_NUMBER);
+            return Ok(None);
         }
-        let over = segment.last || segment.sequence >= self.block_size;
-        Ok(over.then(|| self.acknowledge()))
+        self.sequence = segment.sequence;
+        self.complete = segment.last;
+        self.stray = 0;
+        let before = self.held.replace(segment.data);
+        if let Some(before) = &before {
+            self.crc = self.crc.update(before);
+        }
+        Ok(before)
+    }
+
+    /// The sequence number to acknowledge, if the block is over.
+    pub(super) fn over(&mut self) -> Option<u8> {
+        core::mem::take(&mut self.over).then(|| self.acknowledge())
     }
 
     /// Nothing has come for a while: what to acknowledge so that the sender

@@ -2,9 +2,11 @@
 //! dictionary, confirmed by the other side (CiA 301, 7.2.4).
 //!
 //! [`Server`], [`Channel`] and [`Client`] are sans-IO: a frame and the time go
-//! in, a frame comes out. None of them ever waits.
+//! in, a frame comes out. None of them ever waits. [`AsyncClient`] is the face of
+//! a [`Channel`] for async code.
 
 pub mod abort;
+mod async_client;
 mod block;
 mod channel;
 mod client;
@@ -14,8 +16,10 @@ mod error;
 mod progress;
 mod response;
 mod server;
+mod test_data;
 
 pub use abort::AbortCode;
+pub use async_client::{AsyncClient, Link, Transferring};
 pub use channel::{Channel, Payload, Protocol, Transfer};
 pub use client::Client;
 pub use crc::Crc16;
@@ -23,3 +27,4 @@ pub use error::SdoError;
 pub use progress::{Progress, StartError};
 pub use response::{RESPONSE_MAX, Response};
 pub use server::Server;
+pub use test_data::TestData;

@@ -1,5 +1,6 @@
 //! Tests of the SDO services.
 
+mod async_client;
 mod block;
 mod broken;
 mod client;

@@ -3,7 +3,7 @@
 use super::{BLOCK_SIZE, Channel, Payload, State, Step};
 use crate::sdo::AbortCode;
 use crate::sdo::block::{End, Receiver, Sender, check_block_size};
-use crate::sdo::command::{Answer, BlockSegment, Bytes, Request};
+use crate::sdo::command::{Answer, BlockSegment, Bytes, Request, SEGMENT_MAX};
 
 impl Channel {
     /// CiA 301, 7.2.4.3.9.
@@ -28,7 +28,7 @@ impl Channel {
     }
 
     /// The server does not know block transfers.
-    pub(super) fn fall_back(&mut self, payload: &mut impl Payload) -> Step {
+    pub(super) fn fall_back(&mut self, payload: &mut dyn Payload) -> Step {
         self.block = false;
         Step::Send(match (self.state, self.size) {
             (State::BlockDownload, Some(size)) => self.begin_download(size, payload),
@@ -37,7 +37,7 @@ impl Channel {
     }
 
     /// An answer of a block transfer, other than a segment.
-    pub(super) fn block_step(&mut self, answer: Answer, payload: &mut impl Payload) -> Step {
+    pub(super) fn block_step(&mut self, answer: Answer, payload: &mut dyn Payload) -> Step {
         match (&mut self.state, answer) {
             (
                 State::BlockDownload,
@@ -100,7 +100,7 @@ impl Channel {
     pub(super) fn block_segment(
         &mut self,
         bytes: Bytes,
-        payload: &mut impl Payload,
+        payload: &mut dyn Payload,
     ) -> Option<Step> {
         let State::BlockUploadSegments(receiver) = &mut self.state else {
             return None;
@@ -114,18 +114,17 @@ impl Channel {
                 _ => Some(Step::Violation(AbortCode::SEQUENCE_NUMBER)),
             };
         };
-        let mut held = None;
-        let over = receiver.segment(segment, |data| {
-            held = <[u8; 7]>::try_from(data).ok();
-            Ok(())
-        });
-        if let Some(Err(step)) = held.map(|held| self.take(&held, false, payload)) {
+        let before = match receiver.segment(segment) {
+            Ok(before) => before,
+            Err(code) => return Some(Step::Violation(code)),
+        };
+        let over = receiver.over();
+        if let Some(Err(step)) = before.map(|data| self.take(&data, false, payload)) {
             return Some(step);
         }
         Some(match over {
-            Ok(Some(sequence)) => Step::Send(acknowledge(sequence)),
-            Ok(None) => Step::Wait,
-            Err(code) => Step::Violation(code),
+            Some(sequence) => Step::Send(acknowledge(sequence)),
+            None => Step::Wait,
         })
     }
 
@@ -133,18 +132,20 @@ impl Channel {
     /// upload acknowledges what it has, once, so that the rest is sent again.
     pub(super) fn block_poll(
         &mut self,
-        payload: &mut impl Payload,
+        payload: &mut dyn Payload,
     ) -> Result<Option<Bytes>, AbortCode> {
         let size = self.size.unwrap_or(0);
         match &mut self.state {
             State::BlockDownloadSegments(sender) => {
-                let segment = sender.segment(|offset, buf| {
-                    let left = size.saturating_sub(offset) as usize;
-                    let len = left.min(buf.len());
-                    payload.read(offset, buf.get_mut(..len).unwrap_or(&mut []));
-                    Ok((len, len == left))
-                })?;
-                Ok(segment.map(|segment| segment.encode()))
+                let Some(offset) = sender.next_offset()? else {
+                    return Ok(None);
+                };
+                let mut data = [0; SEGMENT_MAX];
+                let left = size.saturating_sub(offset) as usize;
+                let len = left.min(SEGMENT_MAX);
+                payload.read(offset, data.get_mut(..len).unwrap_or(&mut []));
+                let segment = sender.segment(data, len, len == left)?;
+                Ok(Some(segment.encode()))
             }
             State::BlockUploadSegments(receiver) => Ok(receiver
                 .stall()

@@ -198,7 +198,7 @@ impl Channel {
         at: Address,
         size: u32,
         protocol: Protocol,
-        payload: &mut impl Payload,
+        payload: &mut dyn Payload,
         now: Instant,
     ) -> Result<Frame, StartError> {
         self.start(at, Some(size), now)?;
@@ -257,7 +257,7 @@ impl Channel {
     /// notices the timeout and the end of the quarantine. To be called until it
     /// returns [`Progress::Nothing`], or until there is no room for another
     /// frame.
-    pub fn poll(&mut self, now: Instant, payload: &mut impl Payload) -> Progress<Transfer> {
+    pub fn poll(&mut self, now: Instant, payload: &mut dyn Payload) -> Progress<Transfer> {
         if now < self.deadline {
             return Progress::Nothing;
         }
@@ -291,7 +291,7 @@ impl Channel {
         &mut self,
         frame: &Frame,
         now: Instant,
-        payload: &mut impl Payload,
+        payload: &mut dyn Payload,
     ) -> Progress<Transfer> {
         if frame.id() != self.response_id()
             || frame.data().len() != size_of::<Bytes>()
@@ -310,7 +310,7 @@ impl Channel {
         self.progress(step, now)
     }
 
-    fn step(&mut self, answer: Answer, payload: &mut impl Payload) -> Step {
+    fn step(&mut self, answer: Answer, payload: &mut dyn Payload) -> Step {
         // What names an entry answers a request for that entry.
         if answer.address().is_some_and(|of| of != self.at) {
             return Step::Ignore;
@@ -370,7 +370,7 @@ impl Channel {
     }
 
     /// Hands received bytes on, keeping to the size that was announced.
-    fn take(&mut self, data: &[u8], last: bool, payload: &mut impl Payload) -> Result<(), Step> {
+    fn take(&mut self, data: &[u8], last: bool, payload: &mut dyn Payload) -> Result<(), Step> {
         let len = data.len() as u32;
         let Some(received) = self.received.checked_add(len) else {
             return Err(Step::Violation(AbortCode::TOO_LONG));

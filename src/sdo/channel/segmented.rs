@@ -6,7 +6,7 @@ use crate::sdo::command::{EXPEDITED_MAX, Initiate, Request, SEGMENT_MAX, Segment
 
 impl Channel {
     /// CiA 301, 7.2.4.3.3.
-    pub(super) fn begin_download(&mut self, size: u32, payload: &mut impl Payload) -> Request {
+    pub(super) fn begin_download(&mut self, size: u32, payload: &mut dyn Payload) -> Request {
         let mut data = [0; EXPEDITED_MAX];
         let expedited = usize::try_from(size)
             .ok()
@@ -30,7 +30,7 @@ impl Channel {
         Request::Upload { at: self.at }
     }
 
-    pub(super) fn download_begun(&mut self, expedited: bool, payload: &mut impl Payload) -> Step {
+    pub(super) fn download_begun(&mut self, expedited: bool, payload: &mut dyn Payload) -> Step {
         if expedited {
             Step::Done(self.size.unwrap_or(0))
         } else {
@@ -44,7 +44,7 @@ impl Channel {
         sent: u32,
         toggle: bool,
         got: bool,
-        payload: &mut impl Payload,
+        payload: &mut dyn Payload,
     ) -> Step {
         if got != toggle {
             Step::Violation(AbortCode::TOGGLE)
@@ -55,7 +55,7 @@ impl Channel {
         }
     }
 
-    fn next_segment(&mut self, sent: u32, toggle: bool, payload: &mut impl Payload) -> Step {
+    fn next_segment(&mut self, sent: u32, toggle: bool, payload: &mut dyn Payload) -> Step {
         let left = self.size.unwrap_or(0).saturating_sub(sent);
         let len = left.min(SEGMENT_MAX as u32);
         let mut data = [0; SEGMENT_MAX];
@@ -72,7 +72,7 @@ impl Channel {
     }
 
     /// CiA 301, 7.2.4.3.6. A block upload may be answered like this, too.
-    pub(super) fn upload_begun(&mut self, initiate: Initiate, payload: &mut impl Payload) -> Step {
+    pub(super) fn upload_begun(&mut self, initiate: Initiate, payload: &mut dyn Payload) -> Step {
         let size = match initiate {
             Initiate::Expedited { len, .. } => Some(len.map_or(EXPEDITED_MAX as u32, u32::from)),
             Initiate::Segmented { size } => size,
@@ -103,7 +103,7 @@ impl Channel {
         &mut self,
         toggle: bool,
         segment: Segment,
-        payload: &mut impl Payload,
+        payload: &mut dyn Payload,
     ) -> Step {
         if segment.toggle != toggle {
             return Step::Violation(AbortCode::TOGGLE);

@@ -6,7 +6,7 @@ use crate::id::Address;
 use crate::od::ObjectDictionary;
 use crate::sdo::AbortCode;
 use crate::sdo::block::{End, Receiver, Sender, check_block_size};
-use crate::sdo::command::{Answer, BlockSegment, Bytes, Request};
+use crate::sdo::command::{Answer, BlockSegment, Bytes, Request, SEGMENT_MAX};
 use crate::time::Instant;
 
 impl Server {
@@ -78,13 +78,18 @@ impl Server {
                 _ => Some(Err(AbortCode::SEQUENCE_NUMBER)),
             };
         };
-        let taken = receiver.segment(segment, |data| sink.push(od, data, false));
-        Some(taken.map(|over| {
-            over.map(|sequence| Answer::BlockDownloadAcknowledge {
+        let before = receiver.segment(segment);
+        let answer = receiver
+            .over()
+            .map(|sequence| Answer::BlockDownloadAcknowledge {
                 sequence,
                 block_size: receiver.block_size(),
-            })
-        }))
+            });
+        Some(match before {
+            Ok(Some(data)) => sink.push(od, &data, false).map(|()| answer),
+            Ok(None) => Ok(answer),
+            Err(code) => Err(code),
+        })
     }
 
     /// CiA 301, 7.2.4.3.11.
@@ -176,13 +181,14 @@ impl Server {
                 source,
                 sender,
                 phase: Phase::Segments,
-            } => {
-                let read = |offset, buf: &mut [u8]| {
-                    let chunk = source.read(od, offset, buf)?;
-                    Ok((chunk.len, chunk.last))
-                };
-                sender.segment(read)?.map(|segment| segment.encode())
-            }
+            } => match sender.next_offset()? {
+                Some(offset) => {
+                    let mut data = [0; SEGMENT_MAX];
+                    let chunk = source.read(od, offset, &mut data)?;
+                    Some(sender.segment(data, chunk.len, chunk.last)?.encode())
+                }
+                None => None,
+            },
             State::BlockDownload { receiver, .. } => receiver.stall().map(|sequence| {
                 let block_size = receiver.block_size();
                 Answer::BlockDownloadAcknowledge {
