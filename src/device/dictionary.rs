@@ -43,6 +43,8 @@ pub(super) struct Dictionary<const N: usize> {
     pub(super) axes_enabled: bool,
     pub(super) clock: Clock,
     pub(super) nodes: [NodeRecord; N],
+    /// 2F12h:01 ..= 03
+    pub(super) transfer: [u32; 3],
     pub(super) events: Deque<Event, EVENTS>,
 }
 
@@ -173,7 +175,7 @@ impl<const N: usize> Dictionary<N> {
         Process::find(node, found.sub)
     }
 
-    fn node(&self, node: NodeId) -> Option<(&'static Node, &NodeRecord)> {
+    pub(super) fn node(&self, node: NodeId) -> Option<(&'static Node, &NodeRecord)> {
         let (place, node) = self.network.find(node)?;
         Some((node, self.nodes.get(place)?))
     }
@@ -350,6 +352,7 @@ impl<B: Board, const N: usize> View<'_, B, N> {
                 let [a, b, c, d, e, f] = time.encode();
                 return Ok(u64::from_le_bytes([a, b, c, d, e, f, 0, 0]));
             }
+            Item::TransferTest => self.transfer_word(found.n()),
             Item::Process => {
                 let process = dictionary.process(found).ok_or(AbortCode::NO_DATA)?;
                 let (node, pdo) = (process.node, process.number);
@@ -428,6 +431,7 @@ impl<B: Board, const N: usize> ObjectDictionary for View<'_, B, N> {
                 dictionary.may_request(self.board, NodeControl { command, target })?;
                 return dictionary.push(Event::Configure(target));
             }
+            Item::TransferTest => return self.set_transfer_word(found.n(), number),
             Item::Clock => {
                 let bytes = value.bytes().try_into().map_err(|_| AbortCode::GENERAL)?;
                 let time = TimeOfDay::decode(bytes).ok_or(AbortCode::VALUE_RANGE)?;

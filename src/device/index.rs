@@ -50,6 +50,8 @@ pub(super) const EMCY_WORDS: u16 = 0x2F02;
 pub(super) const CLOCK: u16 = 0x2F10;
 /// Manufacturer: period of TIME.
 pub(super) const TIME_PERIOD: u16 = 0x2F11;
+/// Manufacturer: a transfer of test data.
+pub(super) const TRANSFER_TEST: u16 = 0x2F12;
 /// Manufacturer: emergencies of node n at 2F80h + n.
 pub(super) const EMCY_HISTORY: u16 = 0x2F80;
 pub(super) const EMCY_HISTORY_LAST: u16 = 0x2FFF;

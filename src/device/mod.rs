@@ -22,6 +22,7 @@
 //! | 2F02h:n | newest emergency of node n in words | ro, string |
 //! | 2F10h | the master's clock; 08000024h before it is set | rw, TIME_OF_DAY |
 //! | 2F11h | period of TIME in milliseconds, 0 = off | rw, U16 |
+//! | 2F12h | transfers test data to or from a node by SDO: see [`TransferTest`] | |
 //! | 2F80h + n | emergencies of node n: count (0 clears), then the eight bytes of each, newest first | U64 |
 //! | 3000h + n | process data of node n: what it sends, then what it receives, as mapped | ro |
 //!
@@ -35,11 +36,13 @@ mod node_record;
 mod pdo;
 mod settings;
 mod table;
+mod transfer;
 mod window;
 
 pub use error::MasterError;
 pub use node_record::NodeStatus;
 pub use settings::{Setting, Settings};
+pub use transfer::{TransferResult, TransferTest};
 
 use crate::boot::{self, Startup};
 use crate::emcy::{self, Emcy, EmcyCode};
@@ -109,6 +112,20 @@ pub trait Board {
 
     /// The bytes of an RPDO of a node as it was last sent, zeros before.
     fn rpdo(&mut self, node: NodeId, number: u8) -> [u8; MAX_DATA];
+
+    /// Starts a transfer of test data, 2F12h:04. Called while no axis is
+    /// enabled.
+    ///
+    /// # Errors
+    /// 08000022h if one is under way; 06010000h unless implemented.
+    fn start_transfer(&mut self, _: TransferTest) -> Result<(), AbortCode> {
+        Err(AbortCode::UNSUPPORTED_ACCESS)
+    }
+
+    /// What the last one came to.
+    fn transfer_result(&self) -> TransferResult {
+        TransferResult::NONE
+    }
 }
 
 /// What a client caused, for the caller to carry out.
@@ -157,6 +174,7 @@ impl<const N: usize> Device<N> {
                 axes_enabled: false,
                 clock: time_of_day::Clock::new(),
                 nodes: core::array::from_fn(|_| Default::default()),
+                transfer: [0; 3],
                 events: heapless::Deque::new(),
             },
             time: time_of_day::Producer::new(),

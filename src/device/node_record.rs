@@ -62,6 +62,17 @@ impl NodeStatus {
         })
     }
 
+    /// The master speaks to its SDO server, or is about to.
+    pub(super) const fn is_in_boot_up(&self) -> bool {
+        matches!(
+            self,
+            NodeStatus::Awaited
+                | NodeStatus::Identifying
+                | NodeStatus::Configuring { .. }
+                | NodeStatus::Lost
+        )
+    }
+
     /// The error status of CiA 302-2 as an ASCII letter; 0 for none.
     pub const fn letter(&self) -> u8 {
         match self {

@@ -51,6 +51,7 @@ pub(super) enum Item {
     BootWords,
     EmcyWords,
     Clock,
+    TransferTest,
     EmcyCount,
     EmcyHistory,
     Process,
@@ -122,13 +123,17 @@ const MAPPED: u8 = 64;
 /// Objects of one kind of PDO parameters.
 const PDOS: u16 = 0x1FF;
 
-pub(super) static TABLE: [Row; 51] = {
+pub(super) static TABLE: [Row; 54] = {
     use Access::{Constant, ReadOnly, ReadWrite, WriteOnly};
     use DataType::{
         Domain, TimeOfDay, Unsigned8, Unsigned16, Unsigned32, Unsigned64, VisibleString,
     };
     const fn pdo(first: u16, subs: (u8, u8), data_type: DataType, item: Item) -> Row {
         Row::array(first, subs, data_type, Constant, item).up_to(first + PDOS)
+    }
+    const fn transfer_test(subs: (u8, u8), access: Access) -> Row {
+        let at = index::TRANSFER_TEST;
+        Row::array(at, subs, Unsigned32, access, Item::TransferTest)
     }
     const fn node(at: u16, data_type: DataType, access: Access, item: Item) -> Row {
         Row::array(at, NODES, data_type, access, item)
@@ -318,6 +323,9 @@ pub(super) static TABLE: [Row; 51] = {
         node(index::EMCY_WORDS, VisibleString, ReadOnly, Item::EmcyWords),
         Row::variable(index::CLOCK, TimeOfDay, ReadWrite, Item::Clock),
         Row::setting(index::TIME_PERIOD, Unsigned16, Setting::TimePeriod),
+        transfer_test((1, 3), ReadWrite),
+        transfer_test((4, 4), WriteOnly),
+        transfer_test((5, 7), ReadOnly),
         Row::variable(index::EMCY_HISTORY, Unsigned8, ReadWrite, Item::EmcyCount)
             .up_to(index::EMCY_HISTORY_LAST),
         Row::array(

@@ -10,3 +10,4 @@ mod pdos;
 mod rig;
 mod settings;
 mod time;
+mod transfer;

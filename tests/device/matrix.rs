@@ -96,6 +96,13 @@ const OBJECTS: &[(u16, u8, usize, Access)] = {
         (0x2F02, 1, 0, Read),
         (0x2F10, 0, 6, ReadWrite),
         (0x2F11, 0, 2, ReadWrite),
+        (0x2F12, 0, 1, Read),
+        (0x2F12, 1, 4, ReadWrite),
+        (0x2F12, 2, 4, ReadWrite),
+        (0x2F12, 3, 4, ReadWrite),
+        (0x2F12, 4, 4, Write),
+        (0x2F12, 5, 4, Read),
+        (0x2F12, 7, 4, Read),
         (0x2F81, 0, 1, ReadWrite),
         (0x3001, 0, 1, Read),
         (0x3001, 1, 2, Read),
@@ -179,6 +186,7 @@ const WRITABLE: &[(std::ops::RangeInclusive<u16>, std::ops::RangeInclusive<u8>)]
     (0x1F82..=0x1F82, 1..=128),
     (0x1F89..=0x1F89, 0..=0),
     (0x2F10..=0x2F11, 0..=0),
+    (0x2F12..=0x2F12, 1..=4),
     (0x2F81..=0x2F86, 0..=0),
 ];
 
