@@ -29,13 +29,14 @@ pub const BUTTON_SAMPLES: u8 = 20;
 
 /// Frames that may wait for a transmit buffer. At worst the twelve RPDOs of a
 /// cycle in which all ramps change, an SDO request or an abort for each of six
-/// nodes, an NMT command for each, and a heartbeat: 25. What is over is reserve.
-pub const TX_QUEUE: usize = 32;
+/// nodes, an NMT command for each, and a heartbeat: 25, besides [`OWN_FRAMES`].
+pub const TX_QUEUE: usize = 36;
 
 /// While so many frames wait for a transmit buffer, the board's own SDO server
-/// sends no further segment of a block: the rest of the queue is for those who
-/// cannot wait.
-pub const OWN_FRAMES: usize = 8;
+/// and the transfer test send no further segment of a block: the rest of the
+/// queue is for those who cannot wait. Ten of 111 bits and more keep the bus busy
+/// at 1 Mbit/s for longer than the millisecond after which the next are made.
+pub const OWN_FRAMES: usize = 10;
 
 /// What the firmware can do of 1006h and 1007h. The shortest period is the
 /// deadline of the TPDOs and as much again for the RPDOs; the longest is what the

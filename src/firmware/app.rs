@@ -7,6 +7,7 @@
 //! | 3 | `pdo_producer` | pended by the last TPDO, or TIM3 compare at the deadline |
 //! | 2 | `network` | TIM7, every millisecond |
 //! | 1 | `sdo_configurator` | woken by `can_irq` and `network` |
+//! | 1 | `sdo_transfer` | the same, once 2F12h is written |
 //! | 0 | `idle` | sleeps |
 //!
 //! | resource | ceiling | held for |
@@ -31,13 +32,14 @@ mod app {
         own_node::{Order, OwnNode, Storage},
         report::{publish, tell},
         roll::{self, Task},
-        wake,
+        transfer,
+        wake::{CONFIGURATOR, TRANSFER},
     };
     use canmaster::{
         Frame,
         boot::NetworkBoot,
         design::{self, AXES},
-        device::MasterError,
+        device::{MasterError, TransferTest},
         id::{CobId, FunctionCode},
         master::{
             self, AxisMap, Debounce, ExtendedClock, MasterOd, Put, Reception, Supervisor,
@@ -49,10 +51,7 @@ mod app {
         time::{Duration, Instant},
     };
     use core::{mem::MaybeUninit, sync::atomic::Ordering};
-    use heapless::{
-        Vec,
-        spsc::{Consumer, Producer, Queue},
-    };
+    use heapless::spsc::{Consumer, Producer, Queue};
     use nucleo_g474re::{
         Config, can, pac::Interrupt, pins, reset_cause::ResetCause, timers, watchdog::Watchdog,
     };
@@ -83,6 +82,7 @@ mod app {
         axis_map: AxisMap,
         to_network: Producer<'static, Frame>,
         answers_to: Producer<'static, Frame>,
+        transfer_to: Producer<'static, Frame>,
         requests_to: Producer<'static, Frame>,
         deadline: timers::Deadline,
         axes: &'static mut Axes,
@@ -108,6 +108,8 @@ mod app {
         clock: timers::Microseconds,
         boot: &'static mut NetworkBoot<AXES>,
         answers: Consumer<'static, Frame>,
+        transfer_answers: Consumer<'static, Frame>,
+        transfer_clock: timers::Microseconds,
         states: Consumer<'static, Frame>,
         news: Consumer<'static, News>,
         events: Consumer<'static, GroupEvent>,
@@ -128,6 +130,7 @@ mod app {
         lengths: [[u8; TPDOS_PER_AXIS]; AXES] = [[0; TPDOS_PER_AXIS]; AXES],
         network_queue: FrameQueue = Queue::new(),
         answer_queue: FrameQueue = Queue::new(),
+        transfer_queue: FrameQueue = Queue::new(),
         state_queue: FrameQueue = Queue::new(),
         request_queue: FrameQueue = Queue::new(),
         order_queue: OrderQueue = Queue::new(),
@@ -153,6 +156,7 @@ mod app {
 
         let (to_network, from_can) = cx.local.network_queue.split();
         let (answers_to, answers) = cx.local.answer_queue.split();
+        let (transfer_to, transfer_answers) = cx.local.transfer_queue.split();
         let (states_to, states) = cx.local.state_queue.split();
         let (news_to, news) = cx.local.news_queue.split();
         let (events_to, events) = cx.local.event_queue.split();
@@ -180,6 +184,7 @@ mod app {
                 axis_map: AxisMap::new(NETWORK),
                 to_network,
                 answers_to,
+                transfer_to,
                 requests_to,
                 deadline: board.deadline,
                 axes: new_axes(cx.local.group_place, cx.local.axes_place),
@@ -205,6 +210,8 @@ mod app {
                 clock: board.microseconds,
                 boot,
                 answers,
+                transfer_answers,
+                transfer_clock: board.microseconds,
                 states,
                 news,
                 events,
@@ -271,7 +278,7 @@ mod app {
         roll::check_in(Task::SyncTick);
     }
 
-    /// Empties the receive FIFOs and refills the transmit buffers.
+    /// Refills the transmit buffers and empties the receive FIFOs.
     ///
     /// Trigger: FDCAN1 line 0 (frame received, frame sent, error state), or
     /// pended by a task that put something into the transmit queue. Budget: 2000
@@ -281,7 +288,7 @@ mod app {
     #[task(
         binds = FDCAN1_IT0,
         priority = 4,
-        local = [can_rx, axis_map, to_network, answers_to, requests_to],
+        local = [can_rx, axis_map, to_network, answers_to, transfer_to, requests_to],
         shared = [od, can_tx, tx_queue, bus]
     )]
     fn can_irq(mut cx: can_irq::Context) {
@@ -290,6 +297,7 @@ mod app {
             axis_map,
             to_network,
             answers_to,
+            transfer_to,
             requests_to,
             ..
         } = cx.local;
@@ -307,52 +315,9 @@ mod app {
             }
         }
 
-        let mut answered = false;
-        while let Some(element) = can_rx
-            .receive(can::Fifo::Fifo0)
-            .or_else(|| can_rx.receive(can::Fifo::Fifo1))
-        {
-            let Some(handler) = filters::HANDLERS.get(usize::from(element.filter())) else {
-                continue;
-            };
-            match handler {
-                Handler::Tpdo(number) => {
-                    let axis = element
-                        .identifier()
-                        .and_then(|id| axis_map.axis(id.as_raw()));
-                    let slot = axis.and_then(|axis| TpdoSlot::new(axis, *number));
-                    let (Some(slot), false) = (slot, element.is_remote()) else {
-                        continue;
-                    };
-                    let (data, length) = (element.bytes(), element.len());
-                    match cx.shared.od.lock(|od| od.store(slot, data, length)) {
-                        Reception::Stored => {}
-                        Reception::Last => rtic::pend(Interrupt::TIM3),
-                        Reception::TooShort => counters::TPDO_LENGTH.count(),
-                    }
-                }
-                Handler::Emcy | Handler::ErrorControl => {
-                    queue(to_network, element.frame());
-                }
-                Handler::SdoResponse => {
-                    queue(answers_to, element.frame());
-                    answered = true;
-                }
-                Handler::Request => {
-                    queue(requests_to, element.frame());
-                    answered = true;
-                }
-            }
-        }
-
-        if answered {
-            wake::now();
-        }
-
+        // First of all, so that the bus is not idle for longer than it must.
         loop {
             let pending = cx.shared.can_tx.lock(|can_tx| can_tx.pending());
-            let pending: Vec<CobId, { can::BUFFERS }> =
-                pending.identifiers().map(CobId::from).collect();
             let Some(frame) = cx.shared.tx_queue.lock(|queue| queue.next(&pending)) else {
                 break;
             };
@@ -369,6 +334,58 @@ mod app {
             {
                 counters::RPDO_REPLACED.count();
             }
+        }
+
+        let mut answered = false;
+        let mut transferred = false;
+        while let Some(element) = can_rx
+            .receive(can::Fifo::Fifo0)
+            .or_else(|| can_rx.receive(can::Fifo::Fifo1))
+        {
+            let Some(handler) = filters::HANDLERS.get(usize::from(element.filter())) else {
+                continue;
+            };
+            if let Handler::Tpdo(number) = handler {
+                let axis = element
+                    .identifier()
+                    .and_then(|id| axis_map.axis(id.as_raw()));
+                let slot = axis.and_then(|axis| TpdoSlot::new(axis, *number));
+                let (Some(slot), false) = (slot, element.is_remote()) else {
+                    continue;
+                };
+                let (data, length) = (element.bytes(), element.len());
+                match cx.shared.od.lock(|od| od.store(slot, data, length)) {
+                    Reception::Stored => {}
+                    Reception::Last => rtic::pend(Interrupt::TIM3),
+                    Reception::TooShort => counters::TPDO_LENGTH.count(),
+                }
+                continue;
+            }
+            let Some(frame) = element.frame::<Frame>() else {
+                continue;
+            };
+            let to = match handler {
+                Handler::SdoResponse if transfer::wants(frame.id()) => {
+                    transferred = true;
+                    &mut *transfer_to
+                }
+                Handler::SdoResponse => {
+                    answered = true;
+                    &mut *answers_to
+                }
+                Handler::Request => {
+                    answered = true;
+                    &mut *requests_to
+                }
+                _ => &mut *to_network,
+            };
+            queue(to, Some(frame));
+        }
+        if answered {
+            CONFIGURATOR.now();
+        }
+        if transferred {
+            TRANSFER.now();
         }
         roll::check_in(Task::CanIrq);
     }
@@ -434,7 +451,7 @@ mod app {
             if cx.local.events_to.enqueue(event).is_err() {
                 counters::LOG_FULL.count();
             }
-            wake::want();
+            CONFIGURATOR.want();
         }
     }
 
@@ -465,7 +482,7 @@ mod app {
         while let Some(frame) = local.from_can.dequeue() {
             if let Some((FunctionCode::ErrorControl, _)) = frame.id().split() {
                 queue(local.states_to, Some(frame));
-                wake::want();
+                CONFIGURATOR.want();
             }
             if let Some(report) = local.supervisor.on_frame(&frame, now) {
                 tell(report, local.news_to, &mut cx.shared.control);
@@ -523,7 +540,8 @@ mod app {
         }
         // Sends the heartbeat, and shows that it is alive.
         rtic::pend(Interrupt::FDCAN1_IT0);
-        wake::if_due(counter);
+        CONFIGURATOR.if_due(counter);
+        transfer::tick(counter);
         roll::check_in(Task::Network);
         if roll::complete() {
             local.watchdog.feed();
@@ -547,7 +565,7 @@ mod app {
     )]
     async fn sdo_configurator(mut cx: sdo_configurator::Context) {
         let local = cx.local;
-        let mut wake = wake::reader();
+        let mut wake = CONFIGURATOR.reader();
         let mut log = Log::new(NETWORK);
         log::started(*local.reset_cause);
         defmt::info!(
@@ -617,9 +635,26 @@ mod app {
             let latest = now(*local.clock) + patience;
             let next = [boot.next_deadline(), own.device.next_deadline()];
             let next = next.into_iter().flatten().fold(latest, Instant::min);
-            wake::at(next.as_micros() as u32);
+            CONFIGURATOR.at(next.as_micros() as u32);
             wake.wait().await;
         }
+    }
+
+    /// Moves test data between the board and a node: 2F12h.
+    ///
+    /// Trigger: spawned where 2F12h is written, then the node's answers and
+    /// `network`. Budget: none. If it is starved, the data move slowly, or the node
+    /// gives up.
+    #[task(priority = 1, local = [transfer_answers, transfer_clock], shared = [tx_queue])]
+    async fn sdo_transfer(cx: sdo_transfer::Context, test: TransferTest) {
+        let bus = transfer::Bus {
+            answers: cx.local.transfer_answers,
+            clock: &CLOCK,
+            counter: *cx.local.transfer_clock,
+            tx_queue: cx.shared.tx_queue,
+            wake: TRANSFER.reader(),
+        };
+        transfer::run(test, bus).await
     }
 
     fn now(clock: timers::Microseconds) -> Instant {

@@ -27,6 +27,8 @@ mod report;
 #[cfg(target_os = "none")]
 mod roll;
 #[cfg(target_os = "none")]
+mod transfer;
+#[cfg(target_os = "none")]
 mod wake;
 
 #[cfg(target_os = "none")]

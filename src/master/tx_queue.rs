@@ -6,6 +6,8 @@ use heapless::Vec;
 /// The buffers that frames other than SYNC may occupy. A third stays free, so
 /// that a SYNC never waits for more than the frame on the wire.
 const SHARED_BUFFERS: usize = 2;
+/// The largest identifier.
+const ID_MAX: u16 = 0x7FF;
 
 /// The queue is full: the frame was not taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,20 +83,22 @@ impl<const N: usize> TxQueue<N> {
     }
 
     /// Takes the frame to be given to the controller next. `pending` are the
-    /// identifiers in the controller's buffers.
+    /// identifiers in the controller's buffers; numbers above 7FFh stand for
+    /// buffers without a frame.
     ///
     /// `None` if two frames other than SYNC are there already, or if nothing
     /// waits but identifiers that are: the controller does not keep the order of
     /// equal identifiers, so it gets the next only when the last has left.
-    pub fn next(&mut self, pending: &[CobId]) -> Option<Frame> {
-        let others = pending.iter().filter(|id| **id != CobId::SYNC).count();
-        if others >= SHARED_BUFFERS {
+    pub fn next(&mut self, pending: &[u16]) -> Option<Frame> {
+        let sync = CobId::SYNC.get();
+        let others = pending.iter().filter(|id| **id <= ID_MAX && **id != sync);
+        if others.count() >= SHARED_BUFFERS {
             return None;
         }
         let position = self
             .frames
             .iter()
-            .rposition(|queued| !pending.contains(&queued.id()))?;
+            .rposition(|queued| !pending.contains(&queued.id().get()))?;
         Some(self.frames.remove(position))
     }
 
@@ -130,8 +134,7 @@ mod tests {
     }
 
     fn next<const N: usize>(queue: &mut TxQueue<N>, pending: &[u16]) -> Option<(u16, u8)> {
-        let pending: StdVec<_> = pending.iter().map(|id| CobId::new(*id).unwrap()).collect();
-        let frame = queue.next(&pending)?;
+        let frame = queue.next(pending)?;
         Some((frame.id().get(), frame.data()[0]))
     }
 
@@ -160,9 +163,10 @@ mod tests {
     #[test]
     fn one_buffer_stays_free_for_sync() {
         let mut queue = TxQueue::<8>::new();
+        const FREE: u16 = u16::MAX;
         queue.put(frame(0x201, 1)).unwrap();
-        assert_eq!(next(&mut queue, &[0x301, 0x302]), None);
-        assert_eq!(next(&mut queue, &[0x080, 0x301]), Some((0x201, 1)));
+        assert_eq!(next(&mut queue, &[FREE, 0x301, 0x302]), None);
+        assert_eq!(next(&mut queue, &[0x080, 0x301, FREE]), Some((0x201, 1)));
     }
 
     #[test]

@@ -24,6 +24,9 @@ pub const FILTERS: usize = 28;
 /// How many frames wait in the controller at most.
 pub const BUFFERS: usize = DEPTH;
 
+/// In the place of an identifier: there is no frame. No identifier is that large.
+pub const FREE: u16 = u16::MAX;
+
 /// The two receive FIFOs, three frames deep each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fifo {
@@ -118,13 +121,19 @@ impl Tx {
         found
     }
 
-    /// What waits to be sent.
+    /// The identifiers of the frames that wait to be sent; [`FREE`] for a buffer
+    /// without one.
     #[inline(always)]
-    pub fn pending(&self) -> Pending {
-        Pending {
-            waiting: self.waiting(),
-            identifiers: self.identifiers,
+    pub fn pending(&self) -> [u16; BUFFERS] {
+        let mut waiting = self.waiting();
+        let mut pending = [FREE; BUFFERS];
+        for (place, held) in pending.iter_mut().zip(&self.identifiers) {
+            if waiting & 1 != 0 {
+                *place = *held;
+            }
+            waiting >>= 1;
         }
+        pending
     }
 
     /// Takes back every frame that has not started, so that none goes out late:
@@ -134,25 +143,6 @@ impl Tx {
         registers()
             .txbcr()
             .write(|w| unsafe { w.bits((1 << DEPTH) - 1) });
-    }
-}
-
-/// The frames that waited to be sent at one moment.
-#[derive(Clone, Copy, Debug)]
-pub struct Pending {
-    waiting: u32,
-    identifiers: [u16; DEPTH],
-}
-
-impl Pending {
-    /// Their identifiers.
-    pub fn identifiers(&self) -> impl Iterator<Item = StandardId> {
-        let waiting = self.waiting;
-        self.identifiers
-            .iter()
-            .enumerate()
-            .filter(move |(index, _)| waiting & (1 << index) != 0)
-            .filter_map(|(_, held)| StandardId::new(*held))
     }
 }
 
