@@ -4,6 +4,7 @@ use super::mangle::SdoWrong;
 use super::plant::PlantConfig;
 use super::random::{self, Random};
 use super::servo::ServoConfig;
+use super::test_data::TestData;
 use crate::time::Time;
 use canmaster::NodeId;
 
@@ -90,6 +91,8 @@ pub struct DriveConfig {
     /// Segments per block that its SDO server takes; 0: it answers block
     /// transfers with 05040001h. Unproven on the real drive.
     pub sdo_block_size: u8,
+    /// It has an object for tests of a client, which no EPOS4 has.
+    pub test_data: Option<TestData>,
     /// From an LSS request to its answer.
     pub lss_latency: Spread,
     /// How much longer saving and restoring take (1010h, 1011h).
@@ -127,6 +130,7 @@ impl DriveConfig {
             boot: Spread::new(200_000, 600_000),
             sdo_latency: Spread::new(200, 1000),
             sdo_block_size: 0,
+            test_data: None,
             lss_latency: Spread::new(200, 1000),
             store_time: Spread::fixed(50_000),
             node_guarding: false,

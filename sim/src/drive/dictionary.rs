@@ -6,10 +6,11 @@ use super::errors::Errors;
 use super::modes::Mode;
 use super::objects::{GUARD_TIME, LIFE_TIME_FACTOR, OBJECT_COUNT, TABLE};
 use super::store::{self, UNCONFIGURED};
+use super::test_data::{self, TestData};
 use super::{bit_rate, pdo};
 use canmaster::NodeId;
 use canmaster::id::Address;
-use canmaster::od::{Chunk, Entry, ObjectDictionary, Value, Values};
+use canmaster::od::{Chunk, Entry, ObjectDictionary, Part, Value, Values};
 use canmaster::sdo::AbortCode;
 
 /// "save", as 1010h wants it.
@@ -39,6 +40,8 @@ pub struct Dictionary {
     guarding: bool,
     /// The memory for 1010h is broken.
     pub store_fails: bool,
+    /// Behind 2FF0h, which exists only with it.
+    pub test_data: Option<TestData>,
     /// Behind 1001h, 1003h and 603Fh.
     pub errors: Errors,
     /// Mappings cannot be changed then.
@@ -60,6 +63,7 @@ impl Dictionary {
             identity,
             guarding,
             store_fails: false,
+            test_data: None,
             errors: Errors::default(),
             operational: false,
             refused: Vec::new(),
@@ -223,7 +227,9 @@ impl Dictionary {
 impl ObjectDictionary for Dictionary {
     fn entry(&self, at: Address) -> Result<Entry, AbortCode> {
         let guard = matches!(at.index.0, GUARD_TIME | LIFE_TIME_FACTOR);
-        check(self.guarding || !guard, AbortCode::NO_SUCH_OBJECT)?;
+        let test = at.index.0 == test_data::INDEX;
+        let exists = (self.guarding || !guard) && (self.test_data.is_some() || !test);
+        check(exists, AbortCode::NO_SUCH_OBJECT)?;
         self.values.entry(at)
     }
 
@@ -248,7 +254,17 @@ impl ObjectDictionary for Dictionary {
     }
 
     fn read(&mut self, at: Address, offset: u32, buf: &mut [u8]) -> Result<Chunk, AbortCode> {
-        self.values.read(at, offset, buf)
+        match &self.test_data {
+            Some(test) if at.index.0 == test_data::INDEX => Ok(test.read(offset, buf)),
+            _ => self.values.read(at, offset, buf),
+        }
+    }
+
+    fn write(&mut self, at: Address, part: Part<'_>) -> Result<(), AbortCode> {
+        match &mut self.test_data {
+            Some(test) if at.index.0 == test_data::INDEX => test.write(part),
+            _ => Err(AbortCode::UNSUPPORTED_ACCESS),
+        }
     }
 }
 

@@ -40,6 +40,7 @@ pub mod servo;
 mod status;
 mod store;
 mod supervision;
+pub mod test_data;
 #[cfg(test)]
 mod tests;
 pub mod travel;
@@ -66,6 +67,7 @@ use network::Watch;
 use random::Random;
 use service::SdoService;
 use servo::Servo;
+use test_data::TestData;
 
 /// Microseconds in a second.
 const US_PER_S: f64 = 1e6;
@@ -147,7 +149,8 @@ impl Drive {
         let clock = Clock::new(config.power_on, config.clock_ppm);
         let servo = Servo::new(config.servo, config.plant, config.seed);
         let node = (!config.unconfigured).then_some(config.node);
-        let od = Dictionary::new(node, config.identity, config.node_guarding);
+        let mut od = Dictionary::new(node, config.identity, config.node_guarding);
+        od.test_data = config.test_data;
         let mut random = Random::new(config.seed, random::LATENCY);
         // Control cycles of different drives are not in step.
         let phase = clock.span(random.integer(0, 400));
@@ -189,6 +192,11 @@ impl Drive {
     /// How it was described.
     pub fn config(&self) -> &DriveConfig {
         &self.config
+    }
+
+    /// What came of the object for tests of a client, if it has one.
+    pub fn test_data(&self) -> Option<&TestData> {
+        self.od.test_data.as_ref()
     }
 
     /// Takes in an event of its port. Lets the time up to it pass first.

@@ -4,6 +4,7 @@
 //! Values that depend on the node-ID are put in by
 //! `dictionary`.
 
+use super::test_data;
 use canmaster::od::DataType::{
     Domain, Integer8, Integer16, Integer32, Unsigned8, Unsigned16, Unsigned32,
 };
@@ -133,6 +134,7 @@ const MANUFACTURER: &[Object] = &[
     Object::rw(0x2001, 0, Unsigned8, 9),
     Object::constant(0x2200, 0, Unsigned8, 1),
     Object::ro(0x2200, 1, Unsigned16, 480),
+    Object::rw(test_data::INDEX, 0, Domain, 0),
     Object::rw(0x30B0, 0, Integer32, 0).mappable(Mappable::Both),
     Object::rw(0x30B1, 0, Integer32, 0),
     Object::rw(0x30B2, 0, Unsigned16, 500).mappable(Mappable::Both),

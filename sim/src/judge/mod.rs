@@ -6,6 +6,7 @@ pub mod axis;
 pub mod bus;
 pub mod grid;
 pub mod lss;
+pub mod sdo;
 pub mod verdict;
 
 pub use arrivals::{Arrival, Assignment, Part, Release, arrivals, worst_pair};

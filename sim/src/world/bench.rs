@@ -6,7 +6,7 @@ use super::stimulus::Stimulus;
 use super::{World, network, watch};
 use crate::board::Board;
 use crate::bus::{PortId, WireRecord};
-use crate::drive::{DriveFault, DriveStatus, PlantState};
+use crate::drive::{Drive, DriveFault, DriveStatus, PlantState};
 use crate::log::LogLine;
 use crate::time::Time;
 
@@ -115,7 +115,7 @@ impl World<'_> {
 
     /// What the drive is in that the network does not name, if there is one.
     pub fn stranger(&self) -> Option<DriveStatus> {
-        self.stranger.as_ref().map(|station| station.drive.status())
+        self.strangers.first().map(|station| station.drive.status())
     }
 
     /// Round trips that were finished, and whether one is going on.
@@ -142,6 +142,12 @@ impl World<'_> {
     /// The firmware's log so far.
     pub fn log(&self) -> &[(Time, LogLine)] {
         &self.log
+    }
+
+    /// The drive of that node-ID that the network does not name, if there is one.
+    pub fn stranger_of(&self, node: NodeId) -> Option<&Drive> {
+        let drives = self.strangers.iter().map(|station| &station.drive);
+        drives.into_iter().find(|drive| drive.node() == node)
     }
 
     /// Where a drive is on the bus, if it is there.

@@ -12,6 +12,7 @@ mod scenario;
 mod station;
 mod steps;
 mod stimulus;
+mod tool;
 pub mod trials;
 mod watch;
 
@@ -78,8 +79,8 @@ pub struct World<'i> {
     bus: Bus,
     /// In the order of the network; `None`: not on the bus.
     stations: Vec<Option<Station>>,
-    /// A drive that is none of the network.
-    stranger: Option<Station>,
+    /// Drives that the network does not name.
+    strangers: Vec<Station>,
     ports: Vec<String>,
     bridge: Option<Bridge>,
     guest: Option<guest::Guest>,
@@ -104,20 +105,17 @@ impl<'i> World<'i> {
         let mut ports = vec!["board".to_string()];
         let board_port = bus.attach(&ports[0]);
         let board = Board::new(image.elf(), board_options(&scenario))?;
-        let mut connect = |config: DriveConfig, name: String| {
+        let mut connect = |config: DriveConfig| {
+            let name = format!("node {}", config.node.get());
             let port = bus.attach(&name);
             ports.push(name);
             Station::new(config, port)
         };
         let mut stations = Vec::new();
         for config in station::machine(&scenario) {
-            stations.push(config.map(|config| {
-                let name = format!("node {}", config.node.get());
-                connect(config, name)
-            }));
+            stations.push(config.map(&mut connect));
         }
-        let stranger = station::stranger(&scenario);
-        let stranger = stranger.map(|config| connect(config, "stranger".to_string()));
+        let strangers = scenario.strangers.iter().cloned().map(connect).collect();
         let assignment = assignment();
         let moves = (0..stations.len())
             .map(|axis| assignment.of_axis(axis).count())
@@ -142,7 +140,7 @@ impl<'i> World<'i> {
             board_timing: None,
             bus,
             stations,
-            stranger,
+            strangers,
             ports,
             bridge: None,
             guest: None,

@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use canmaster::NodeId;
 use canmaster::sdo::AbortCode;
 
-use super::network;
 use super::stimulus::Stimulus;
+use super::{network, station};
 use crate::board::{BankContents, FlashOptions};
-use crate::drive::{DriveFault, Identity};
+use crate::drive::{DriveConfig, DriveFault, Identity};
 use crate::time::Time;
 
 /// EPOS4 Module 24/1.5: the same maker's, but not the drive that the network
@@ -45,8 +45,10 @@ pub struct Scenario {
     /// The drives come from the factory: none has a node-ID. They are switched on
     /// in an order drawn from the seed.
     pub factory: bool,
-    /// There is one more drive without node-ID, which the network does not name.
-    pub stranger: bool,
+    /// Drives that the network does not name, each with a node-ID of its own.
+    pub strangers: Vec<DriveConfig>,
+    /// Changes every drive of the network before its faults are put in.
+    pub tuned: fn(DriveConfig) -> DriveConfig,
     /// Faults that drives have from power-on.
     pub faults: BTreeMap<NodeId, Vec<DriveFault>>,
     /// Done at given moments.
@@ -67,7 +69,8 @@ impl Scenario {
             end,
             without: Vec::new(),
             factory: false,
-            stranger: false,
+            strangers: Vec::new(),
+            tuned: |config| config,
             faults: BTreeMap::new(),
             stimuli: Vec::new(),
             in_motion: Vec::new(),
@@ -91,9 +94,22 @@ impl Scenario {
         self
     }
 
-    /// The same with a stranger on the bus.
-    pub fn with_stranger(mut self) -> Scenario {
-        self.stranger = true;
+    /// The same with one more drive without node-ID, which the network does not
+    /// name.
+    pub fn with_stranger(self) -> Scenario {
+        let config = station::stranger(self.seed);
+        self.stranger(config)
+    }
+
+    /// The same with another drive on the bus.
+    pub fn stranger(mut self, config: DriveConfig) -> Scenario {
+        self.strangers.push(config);
+        self
+    }
+
+    /// The same with all drives of the network changed.
+    pub fn tuned(mut self, tuned: fn(DriveConfig) -> DriveConfig) -> Scenario {
+        self.tuned = tuned;
         self
     }
 

@@ -50,7 +50,8 @@ pub(super) fn machine(scenario: &Scenario) -> Vec<Option<DriveConfig>> {
     let mut random = Pcg64Mcg::seed_from_u64(scenario.seed ^ FACTORY_STREAM);
     let mut drive = |node: NodeId| {
         let faults = scenario.faults.get(&node).into_iter().flatten().copied();
-        let mut config = faults.fold(DriveConfig::new(node, scenario.seed), DriveConfig::with);
+        let config = (scenario.tuned)(DriveConfig::new(node, scenario.seed));
+        let mut config = faults.fold(config, DriveConfig::with);
         if scenario.factory {
             config.unconfigured = true;
             config.power_on = Time::from_us(random.random_range(0..=SWITCHED_ON_US));
@@ -63,12 +64,12 @@ pub(super) fn machine(scenario: &Scenario) -> Vec<Option<DriveConfig>> {
         .collect()
 }
 
-/// A drive without node-ID that the network does not name, if there is to be one.
-pub(super) fn stranger(scenario: &Scenario) -> Option<DriveConfig> {
+/// A drive without node-ID that the network does not name.
+pub(super) fn stranger(seed: u64) -> DriveConfig {
     let mut others = (1..=NodeId::MAX.get()).filter_map(NodeId::new);
-    let node = others.find(|node| network().find(*node).is_none())?;
-    scenario.stranger.then(|| DriveConfig {
+    let node = others.find(|node| network().find(*node).is_none());
+    DriveConfig {
         unconfigured: true,
-        ..DriveConfig::new(node, scenario.seed)
-    })
+        ..DriveConfig::new(node.unwrap_or(NodeId::MAX), seed)
+    }
 }

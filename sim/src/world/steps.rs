@@ -62,9 +62,9 @@ impl World<'_> {
         .unwrap_or(self.next_look)
     }
 
-    /// Every drive on the bus, that of no network too.
+    /// Every drive on the bus, those of no network too.
     fn drives(&self) -> impl Iterator<Item = &Station> {
-        self.stations.iter().flatten().chain(&self.stranger)
+        self.stations.iter().flatten().chain(&self.strangers)
     }
 
     fn offer_board(&mut self) {
@@ -83,7 +83,7 @@ impl World<'_> {
         for event in &events {
             if event.port == self.board_port {
                 self.board.can_event(FDCAN1, event);
-            } else if let Some(station) = drives(&mut self.stations, &mut self.stranger)
+            } else if let Some(station) = drives(&mut self.stations, &mut self.strangers)
                 .find(|station| station.port == event.port)
             {
                 station.drive.on_event(event);
@@ -104,7 +104,7 @@ impl World<'_> {
     }
 
     fn advance_drives(&mut self) {
-        for station in drives(&mut self.stations, &mut self.stranger) {
+        for station in drives(&mut self.stations, &mut self.strangers) {
             station.advance(&mut self.bus, self.now);
         }
         if let Some(bridge) = &mut self.bridge {
@@ -118,7 +118,7 @@ impl World<'_> {
     fn look(&mut self, observer: &mut dyn Observer) {
         self.wire.extend(self.bus.take_records());
         self.read_log(observer);
-        for station in drives(&mut self.stations, &mut self.stranger) {
+        for station in drives(&mut self.stations, &mut self.strangers) {
             // Control cycles that nobody waits for have not been worked out yet.
             station.drive.advance(self.now);
         }
@@ -186,9 +186,9 @@ impl World<'_> {
 /// See [`World::drives`].
 fn drives<'s>(
     stations: &'s mut [Option<Station>],
-    stranger: &'s mut Option<Station>,
+    strangers: &'s mut [Station],
 ) -> impl Iterator<Item = &'s mut Station> {
-    stations.iter_mut().flatten().chain(stranger)
+    stations.iter_mut().flatten().chain(strangers)
 }
 
 fn axis_truth(drive: &Drive) -> AxisTruth {
