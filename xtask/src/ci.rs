@@ -5,9 +5,9 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 
-use crate::cli::{CiOptions, LogLevel, RunOptions, TestOptions};
+use crate::cli::{Bench, BenchOptions, CiOptions, LogLevel, RunOptions, TestOptions};
 use crate::image::{Budget, ImageSize};
-use crate::{cargo, conformance, firmware, interop, run, size, toolchain};
+use crate::{bench, cargo, conformance, firmware, interop, run, size, toolchain};
 
 /// A name and what is done.
 type Step = (&'static str, fn() -> Result<()>);
@@ -39,13 +39,15 @@ fn tests(args: &[String]) -> Result<()> {
 /// `cargo xtask ci`: everything that has to pass, in the order of how soon it
 /// fails.
 pub(crate) fn command(options: &CiOptions) -> Result<ExitCode> {
-    let steps: [Step; 9] = [
+    let steps: [Step; 11] = [
         ("format", format),
         ("lints, host", lints_host),
         ("lints, board", lints_target),
         (TESTS, || tests(&[])),
         ("sizes", sizes),
         ("one run", one_run),
+        ("bench startup", || benched(Bench::Startup)),
+        ("bench sdo", || benched(Bench::Sdo)),
         ("other tools", interop::tests),
         ("documentation", documentation),
         ("conformance table", conformance::check),
@@ -117,6 +119,18 @@ fn one_run() -> Result<()> {
     };
     if run::command(&options)? != ExitCode::SUCCESS {
         bail!("not every move of every drive arrived");
+    }
+    Ok(())
+}
+
+fn benched(bench: Bench) -> Result<()> {
+    let options = BenchOptions {
+        bench,
+        seed: 1,
+        json: false,
+    };
+    if bench::command(&options)? != ExitCode::SUCCESS {
+        bail!("a limit was missed");
     }
     Ok(())
 }

@@ -77,6 +77,8 @@ pub(crate) enum Command {
     Ci(CiOptions),
     /// The long figures: many seeds of 60 simulated seconds each
     Campaign(CampaignOptions),
+    /// Figures that the image has to reach, one bench each
+    Bench(BenchOptions),
 }
 
 #[derive(Args, Clone, Debug)]
@@ -177,6 +179,28 @@ pub(crate) struct CampaignOptions {
     /// One JSON object on standard output and nothing else there
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+#[derive(Args, Clone, Debug)]
+pub(crate) struct BenchOptions {
+    /// Which figures
+    #[arg(value_enum)]
+    pub(crate) bench: Bench,
+    /// Seed of everything that is drawn at random
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// One JSON object on standard output and nothing else there
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// What can be measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Bench {
+    /// How long the configuration of all drives takes
+    Startup,
+    /// How fast data goes to and from a drive by SDO
+    Sdo,
 }
 
 /// Severities as they are typed.

@@ -1,6 +1,7 @@
 //! The project's commands. `cargo xtask help` lists them.
 
 mod attach;
+mod bench;
 mod campaign;
 mod capacity;
 mod cargo;
@@ -37,6 +38,7 @@ fn main() -> ExitCode {
         Command::Interop => interop::command(),
         Command::Ci(options) => ci::command(&options),
         Command::Campaign(options) => campaign::command(&options),
+        Command::Bench(options) => bench::command(&options),
     };
     match outcome {
         Ok(code) => code,

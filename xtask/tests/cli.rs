@@ -25,6 +25,9 @@ fn bad_input_ends_with_usage_and_exit_code_two() {
         &["size", "now"],
         &["new"],
         &["capacity", "--fast"],
+        &["bench"],
+        &["bench", "fast"],
+        &["bench", "sdo", "--seed", "x"],
         &["fly"],
         &[],
     ] {
@@ -150,6 +153,20 @@ fn a_run_prints_one_json_object_with_the_documented_names() {
             "{field}"
         );
     }
+}
+
+#[test]
+fn the_startup_bench_prints_one_json_object_with_the_documented_names() {
+    let assert = xtask()
+        .args(["bench", "startup", "--json"])
+        .assert()
+        .success();
+    let object: Value = serde_json::from_slice(&assert.get_output().stdout).unwrap();
+    assert_eq!(object["result"], "ok");
+    let figure = |name: &str| object[name].as_f64().unwrap_or_else(|| panic!("{name}"));
+    assert!(figure("ratio") <= 1.3 && figure("ratio") >= 1.0, "{object}");
+    assert!(figure("configure_ms") >= figure("wire_bound_ms"));
+    assert!(figure("sequential_ms") >= 2.0 * figure("configure_ms"));
 }
 
 #[test]

@@ -80,7 +80,9 @@ fn scenario(options: &RunOptions) -> Scenario {
     };
     let mut sound = Scenario::new(options.seed, end);
     sound.factory = options.factory;
-    sound.stranger = options.stranger;
+    if options.stranger {
+        sound = sound.with_stranger();
+    }
     let complete = options
         .without
         .iter()

@@ -1,0 +1,70 @@
+//! `cargo xtask bench`: figures that the release image has to reach on the
+//! emulated board, judged on the bus.
+
+mod sdo;
+mod startup;
+
+use std::process::ExitCode;
+
+use anyhow::{Context, Result};
+use canmaster_sim::world::Image;
+use serde::Serialize;
+
+use crate::cli::{Bench, BenchOptions};
+use crate::firmware;
+
+pub(crate) fn command(options: &BenchOptions) -> Result<ExitCode> {
+    eprintln!("Building the firmware.");
+    let image = Image::read(&firmware::build()?).context("the firmware image cannot be run")?;
+    let outcome = match options.bench {
+        Bench::Startup => startup::run(&image, options.seed)?,
+        Bench::Sdo => sdo::run(&image, options.seed)?,
+    };
+    if options.json {
+        println!("{}", outcome.json);
+    } else {
+        println!("{}", outcome.table);
+    }
+    if outcome.missed.is_empty() {
+        return Ok(ExitCode::SUCCESS);
+    }
+    for words in &outcome.missed {
+        eprintln!("missed: {words}");
+    }
+    Ok(ExitCode::FAILURE)
+}
+
+/// What a bench comes to.
+struct Outcome {
+    json: String,
+    table: comfy_table::Table,
+    /// The limits that were missed, in words.
+    missed: Vec<String>,
+}
+
+/// The JSON object of a bench: its figures, and whether they reach the limits.
+#[derive(Serialize)]
+struct Report<F> {
+    result: &'static str,
+    reason: String,
+    seed: u64,
+    wall_s: f64,
+    #[serde(flatten)]
+    figures: F,
+}
+
+impl<F: Serialize> Report<F> {
+    fn new(figures: F, seed: u64, wall_s: f64, missed: &[String]) -> Report<F> {
+        Report {
+            result: if missed.is_empty() { "ok" } else { "failed" },
+            reason: missed.join("; "),
+            seed,
+            wall_s,
+            figures,
+        }
+    }
+
+    fn json(&self) -> Result<String> {
+        Ok(serde_json::to_string(self)?)
+    }
+}
