@@ -46,6 +46,22 @@ impl SyncParameters {
         }
     }
 
+    /// The parameters with these values of 1005h, 1006h, 1007h and 1019h, each of
+    /// which was accepted.
+    pub(crate) const fn of(
+        cob_id: SyncCobId,
+        period: u32,
+        window: u32,
+        overflow: u8,
+    ) -> SyncParameters {
+        SyncParameters {
+            cob_id,
+            period,
+            window,
+            overflow,
+        }
+    }
+
     /// 1005h.
     pub const fn cob_id(&self) -> SyncCobId {
         self.cob_id
@@ -134,8 +150,9 @@ impl SyncParameters {
     /// Writes 1019h.
     ///
     /// # Errors
-    /// 08000022h while 1006h is not 0; 06090030h for 1 and 241..=255.
-    pub fn set_overflow(&mut self, overflow: u8) -> Result<(), AbortCode> {
+    /// 08000022h while 1006h is not 0; 06090030h for 1 and above 240.
+    pub fn set_overflow(&mut self, overflow: u32) -> Result<(), AbortCode> {
+        let overflow = u8::try_from(overflow).map_err(|_| AbortCode::VALUE_RANGE)?;
         self.overflow = SyncCounter::new(overflow, self.period)?.overflow();
         Ok(())
     }

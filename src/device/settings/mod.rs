@@ -18,25 +18,19 @@ use crate::time_of_day::TimeCobId;
 /// The settings of a master of at most `N` nodes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Settings<const N: usize> {
-    sync: SyncParameters,
-    time_cob_id: TimeCobId,
-    time_period_ms: u16,
-    emcy_cob_id: EmcyCobId,
-    emcy_inhibit: u16,
-    heartbeat_ms: u16,
+    /// Of the board alone, by [`Setting::place`].
+    own: [u32; setting::OWN],
+    /// 1016h
     consumers: [u32; N],
-    error_behaviour: ErrorBehaviour,
-    startup: Startup,
-    assignments: [Assignment; N],
-    boot_time_ms: u32,
-    configured: [u32; 2],
+    /// 1F81h
+    assignments: [u32; N],
 }
 
 /// 1F8Ah: what a node is told to restore before it is configured: 1011h:01, all
 /// parameters.
 pub(super) const RESTORE_ALL: u8 = 1;
 /// How often TIME is sent unless told otherwise.
-const TIME_PERIOD_MS: u16 = 1000;
+const TIME_PERIOD_MS: u32 = 1000;
 /// A consumer heartbeat time: node in bits 23..16, milliseconds in bits 15..0.
 const CONSUMER_NODE: u32 = 16;
 const CONSUMER_MS: u32 = 0xFFFF;
@@ -48,20 +42,33 @@ impl<const N: usize> Settings<N> {
     /// As the network's design has them.
     pub fn new(network: &Network) -> Settings<N> {
         let mut settings = Settings {
-            sync: SyncParameters::new(network.cycle.as_micros()),
-            time_cob_id: TimeCobId::DEFAULT,
-            time_period_ms: TIME_PERIOD_MS,
-            emcy_cob_id: EmcyCobId::predefined(network.master.node),
-            emcy_inhibit: 0,
-            heartbeat_ms: network.master.heartbeat.as_millis() as u16,
+            own: [0; setting::OWN],
             consumers: [0; N],
-            // A lost node does not take the master down.
-            error_behaviour: ErrorBehaviour::NoChange,
-            startup: Startup(Startup::MASTER | Startup::START_ALL),
-            assignments: [Assignment(0); N],
-            boot_time_ms: network.master.boot_time.as_millis(),
-            configured: [0; 2],
+            assignments: [0; N],
         };
+        for (setting, value) in [
+            (Setting::SyncCobId, SyncCobId::DEFAULT.0),
+            (Setting::SyncPeriod, network.cycle.as_micros()),
+            (Setting::TimeCobId, TimeCobId::DEFAULT.0),
+            (Setting::TimePeriod, TIME_PERIOD_MS),
+            (
+                Setting::EmcyCobId,
+                EmcyCobId::predefined(network.master.node).0,
+            ),
+            (
+                Setting::ProducerHeartbeat,
+                network.master.heartbeat.as_millis(),
+            ),
+            // A lost node does not take the master down.
+            (
+                Setting::ErrorBehaviour,
+                ErrorBehaviour::NoChange.code().into(),
+            ),
+            (Setting::Startup, Startup::MASTER | Startup::START_ALL),
+            (Setting::BootTime, network.master.boot_time.as_millis()),
+        ] {
+            settings.store(setting, value);
+        }
         for (node, (consumer, assignment)) in network
             .nodes
             .iter()
@@ -79,46 +86,50 @@ impl<const N: usize> Settings<N> {
             } else {
                 0
             };
-            *assignment = Assignment(Assignment::LISTED | Assignment::MAY_START | mandatory);
+            *assignment = Assignment::LISTED | Assignment::MAY_START | mandatory;
         }
         settings
     }
 
     /// 1005h, 1006h, 1007h, 1019h.
-    pub const fn sync(&self) -> &SyncParameters {
-        &self.sync
+    pub fn sync(&self) -> SyncParameters {
+        SyncParameters::of(
+            SyncCobId(self.get(Setting::SyncCobId)),
+            self.get(Setting::SyncPeriod),
+            self.get(Setting::SyncWindow),
+            self.get(Setting::SyncOverflow) as u8,
+        )
     }
 
     /// Sets or clears bit 30 of 1005h from within the device.
     pub(super) fn set_sync_producer(&mut self, on: bool) {
-        let cob_id = self.sync.cob_id().producer(on);
-        // The identifier stays, so it is not refused.
-        let _ = self.sync.set_cob_id(cob_id);
+        let cob_id = SyncCobId(self.get(Setting::SyncCobId)).producer(on);
+        self.store(Setting::SyncCobId, cob_id.0);
     }
 
     /// 1012h.
-    pub const fn time_cob_id(&self) -> TimeCobId {
-        self.time_cob_id
+    pub fn time_cob_id(&self) -> TimeCobId {
+        TimeCobId(self.get(Setting::TimeCobId))
     }
 
     /// 2F11h.
-    pub const fn time_period(&self) -> Duration {
-        Duration::from_millis(self.time_period_ms as u32)
+    pub fn time_period(&self) -> Duration {
+        Duration::from_millis(self.get(Setting::TimePeriod))
     }
 
     /// 1014h.
-    pub const fn emcy_cob_id(&self) -> EmcyCobId {
-        self.emcy_cob_id
+    pub fn emcy_cob_id(&self) -> EmcyCobId {
+        EmcyCobId(self.get(Setting::EmcyCobId))
     }
 
     /// 1015h, in units of 100 us.
-    pub const fn emcy_inhibit(&self) -> u16 {
-        self.emcy_inhibit
+    pub fn emcy_inhibit(&self) -> u16 {
+        self.get(Setting::EmcyInhibit) as u16
     }
 
     /// 1017h.
-    pub const fn heartbeat(&self) -> Duration {
-        Duration::from_millis(self.heartbeat_ms as u32)
+    pub fn heartbeat(&self) -> Duration {
+        Duration::from_millis(self.get(Setting::ProducerHeartbeat))
     }
 
     /// 1016h: who is watched, and how long its heartbeat may stay away.
@@ -134,33 +145,34 @@ impl<const N: usize> Settings<N> {
     }
 
     /// 1029h:01.
-    pub const fn error_behaviour(&self) -> ErrorBehaviour {
-        self.error_behaviour
+    pub fn error_behaviour(&self) -> ErrorBehaviour {
+        let code = self.get(Setting::ErrorBehaviour) as u8;
+        ErrorBehaviour::from_code(code).unwrap_or_default()
     }
 
     /// 1F80h.
-    pub const fn startup(&self) -> Startup {
-        self.startup
+    pub fn startup(&self) -> Startup {
+        Startup(self.get(Setting::Startup))
     }
 
     /// 1F81h of the node with this place in the network.
     pub fn assignment(&self, place: usize) -> Option<Assignment> {
-        self.assignments.get(place).copied()
+        self.assignments.get(place).copied().map(Assignment)
     }
 
     /// 1F89h; zero: for ever.
-    pub const fn boot_time(&self) -> Duration {
-        Duration::from_millis(self.boot_time_ms)
+    pub fn boot_time(&self) -> Duration {
+        Duration::from_millis(self.get(Setting::BootTime))
     }
 
     /// What the boot-up of the network goes by: 1F80h, 1F81h, 1F89h; 1F8Ah as it
     /// is in this dictionary.
     pub fn boot(&self) -> boot::Settings<N> {
         boot::Settings {
-            startup: self.startup,
+            startup: self.startup(),
             boot_time: self.boot_time(),
             nodes: self.assignments.map(|assignment| boot::NodeSettings {
-                assignment,
+                assignment: Assignment(assignment),
                 restore: RESTORE_ALL,
             }),
         }
@@ -168,26 +180,26 @@ impl<const N: usize> Settings<N> {
 
     /// The value of an entry.
     pub fn get(&self, setting: Setting) -> u32 {
+        let slot = match setting {
+            Setting::ConsumerHeartbeat(n) => self.consumers.get(usize::from(n)),
+            Setting::Assignment(n) => self.assignments.get(usize::from(n)),
+            own => self.own.get(own.place()),
+        };
+        slot.copied().unwrap_or_default()
+    }
+
+    fn slot(&mut self, setting: Setting) -> Option<&mut u32> {
         match setting {
-            Setting::SyncCobId => self.sync.cob_id().0,
-            Setting::SyncPeriod => self.sync.period(),
-            Setting::SyncWindow => self.sync.window(),
-            Setting::SyncOverflow => u32::from(self.sync.overflow()),
-            Setting::TimeCobId => self.time_cob_id.0,
-            Setting::TimePeriod => u32::from(self.time_period_ms),
-            Setting::EmcyCobId => self.emcy_cob_id.0,
-            Setting::EmcyInhibit => u32::from(self.emcy_inhibit),
-            Setting::ConsumerHeartbeat(n) => element(&self.consumers, n),
-            Setting::ProducerHeartbeat => u32::from(self.heartbeat_ms),
-            Setting::ConfigurationDate => element(&self.configured, 0),
-            Setting::ConfigurationTime => element(&self.configured, 1),
-            Setting::ErrorBehaviour => u32::from(self.error_behaviour.code()),
-            Setting::Startup => self.startup.0,
-            Setting::Assignment(n) => self
-                .assignments
-                .get(usize::from(n))
-                .map_or(0, |assignment| assignment.0),
-            Setting::BootTime => self.boot_time_ms,
+            Setting::ConsumerHeartbeat(n) => self.consumers.get_mut(usize::from(n)),
+            Setting::Assignment(n) => self.assignments.get_mut(usize::from(n)),
+            own => self.own.get_mut(own.place()),
+        }
+    }
+
+    /// Takes over a value that is known to be right.
+    fn store(&mut self, setting: Setting, value: u32) {
+        if let Some(slot) = self.slot(setting) {
+            *slot = value;
         }
     }
 
@@ -208,59 +220,44 @@ impl<const N: usize> Settings<N> {
             setting,
             Setting::ConfigurationDate | Setting::ConfigurationTime
         );
-        if !is_signature && self.get(setting) != before {
-            self.configured = [0; 2];
+        if !is_signature && value != before {
+            self.store(Setting::ConfigurationDate, 0);
+            self.store(Setting::ConfigurationTime, 0);
         }
         Ok(())
     }
 
     fn put(&mut self, setting: Setting, value: u32, limits: &SyncLimits) -> Result<(), AbortCode> {
+        let mut sync = self.sync();
         match setting {
-            Setting::SyncCobId => return self.sync.set_cob_id(SyncCobId(value)),
-            Setting::SyncPeriod => return self.sync.set_period(value, limits),
-            Setting::SyncWindow => return self.sync.set_window(value, limits),
-            Setting::SyncOverflow => {
-                let overflow = u8::try_from(value).map_err(|_| AbortCode::VALUE_RANGE)?;
-                return self.sync.set_overflow(overflow);
+            Setting::SyncCobId => sync.set_cob_id(SyncCobId(value)),
+            Setting::SyncPeriod => sync.set_period(value, limits),
+            Setting::SyncWindow => sync.set_window(value, limits),
+            Setting::SyncOverflow => sync.set_overflow(value),
+            Setting::TimeCobId => TimeCobId(value).may_replace(self.time_cob_id()),
+            Setting::EmcyCobId => EmcyCobId(value).may_replace(self.emcy_cob_id()),
+            Setting::ConsumerHeartbeat(n) => self.consumer_fits(usize::from(n), value),
+            Setting::Startup => Startup::new(value).map(|_| ()),
+            Setting::Assignment(_) => Assignment::new(value).map(|_| ()),
+            Setting::BootTime if Duration::from_millis(value) == Duration::MAX => {
+                Err(AbortCode::VALUE_TOO_HIGH)
             }
-            Setting::TimeCobId => {
-                TimeCobId(value).may_replace(self.time_cob_id)?;
-                self.time_cob_id = TimeCobId(value);
+            Setting::ErrorBehaviour if value > u32::from(ErrorBehaviour::MAX) => {
+                Err(AbortCode::VALUE_RANGE)
             }
-            Setting::TimePeriod => self.time_period_ms = value as u16,
-            Setting::EmcyCobId => {
-                EmcyCobId(value).may_replace(self.emcy_cob_id)?;
-                self.emcy_cob_id = EmcyCobId(value);
+            Setting::TimePeriod | Setting::EmcyInhibit | Setting::ProducerHeartbeat
+                if value > u32::from(u16::MAX) =>
+            {
+                Err(AbortCode::VALUE_RANGE)
             }
-            Setting::EmcyInhibit => self.emcy_inhibit = value as u16,
-            Setting::ConsumerHeartbeat(n) => self.set_consumer(usize::from(n), value)?,
-            Setting::ProducerHeartbeat => self.heartbeat_ms = value as u16,
-            Setting::ConfigurationDate => put_element(&mut self.configured, 0, value)?,
-            Setting::ConfigurationTime => put_element(&mut self.configured, 1, value)?,
-            Setting::ErrorBehaviour => {
-                let code = u8::try_from(value).map_err(|_| AbortCode::VALUE_RANGE)?;
-                self.error_behaviour =
-                    ErrorBehaviour::from_code(code).ok_or(AbortCode::VALUE_RANGE)?;
-            }
-            Setting::Startup => {
-                self.startup = Startup::new(value)?;
-            }
-            Setting::Assignment(n) => {
-                let assignment = Assignment::new(value)?;
-                put_element(&mut self.assignments, usize::from(n), assignment)?;
-            }
-            Setting::BootTime => {
-                if Duration::from_millis(value) == Duration::MAX {
-                    return Err(AbortCode::VALUE_TOO_HIGH);
-                }
-                self.boot_time_ms = value;
-            }
-        }
+            _ => Ok(()),
+        }?;
+        *self.slot(setting).ok_or(AbortCode::NO_SUCH_SUB_INDEX)? = value;
         Ok(())
     }
 
     /// No node is watched by two entries (CiA 301, 7.5.2.19).
-    fn set_consumer(&mut self, n: usize, value: u32) -> Result<(), AbortCode> {
+    fn consumer_fits(&self, n: usize, value: u32) -> Result<(), AbortCode> {
         if value >> CONSUMER_NODE > u32::from(u8::MAX) {
             return Err(AbortCode::VALUE_RANGE);
         }
@@ -273,7 +270,7 @@ impl<const N: usize> Settings<N> {
         if self.consumers.iter().enumerate().any(taken) {
             return Err(AbortCode::PARAMETER_INCOMPATIBLE);
         }
-        put_element(&mut self.consumers, n, value)
+        Ok(())
     }
 }
 
@@ -291,13 +288,4 @@ fn consumer(entry: u32) -> Option<(NodeId, Duration)> {
     let node = NodeId::new((entry >> CONSUMER_NODE) as u8)?;
     let ms = entry & CONSUMER_MS;
     (ms != 0).then(|| (node, Duration::from_millis(ms)))
-}
-
-fn element(from: &[u32], n: u8) -> u32 {
-    from.get(usize::from(n)).copied().unwrap_or_default()
-}
-
-fn put_element<T>(into: &mut [T], n: usize, value: T) -> Result<(), AbortCode> {
-    *into.get_mut(n).ok_or(AbortCode::NO_SUCH_SUB_INDEX)? = value;
-    Ok(())
 }

@@ -44,9 +44,12 @@ pub enum Setting {
     TimePeriod,
 }
 
-/// The settings of the board alone, in an order in which they can be loaded: the
+/// Settings of the board alone.
+pub(super) const OWN: usize = 14;
+
+/// Those of them that are saved, in an order in which they can be loaded: the
 /// SYNC's period after what may be changed only without one.
-const OWN: [Setting; 13] = [
+const SAVED: [Setting; OWN - 1] = [
     Setting::SyncOverflow,
     Setting::SyncWindow,
     Setting::SyncPeriod,
@@ -63,6 +66,26 @@ const OWN: [Setting; 13] = [
 ];
 
 impl Setting {
+    /// Where a setting of the board alone is kept.
+    pub(super) const fn place(self) -> usize {
+        match self {
+            Setting::SyncCobId | Setting::ConsumerHeartbeat(_) | Setting::Assignment(_) => 0,
+            Setting::SyncPeriod => 1,
+            Setting::SyncWindow => 2,
+            Setting::TimeCobId => 3,
+            Setting::EmcyCobId => 4,
+            Setting::EmcyInhibit => 5,
+            Setting::ProducerHeartbeat => 6,
+            Setting::SyncOverflow => 7,
+            Setting::ConfigurationDate => 8,
+            Setting::ConfigurationTime => 9,
+            Setting::ErrorBehaviour => 10,
+            Setting::Startup => 11,
+            Setting::BootTime => 12,
+            Setting::TimePeriod => 13,
+        }
+    }
+
     /// Type of the entry.
     pub fn data_type(self) -> DataType {
         self.row().map_or(DataType::Unsigned32, |row| row.data_type)
@@ -105,8 +128,8 @@ impl Setting {
     }
 
     fn nth_saved(n: u8, nodes: u8) -> Option<Setting> {
-        let Some(n) = usize::from(n).checked_sub(OWN.len()) else {
-            return OWN.get(usize::from(n)).copied();
+        let Some(n) = usize::from(n).checked_sub(SAVED.len()) else {
+            return SAVED.get(usize::from(n)).copied();
         };
         let n = n as u8;
         if n < nodes {
