@@ -68,39 +68,36 @@ impl MasterError {
     /// The emergency that reports it, with the bits of the error register that
     /// it sets.
     pub const fn emcy(self) -> Emcy {
-        const COMMUNICATION: ErrorRegister = ErrorRegister::COMMUNICATION;
-        const GENERIC: ErrorRegister = ErrorRegister::GENERIC;
-        const OF_MANUFACTURER: ErrorRegister = ErrorRegister::MANUFACTURER;
-        const fn of(code: u16, register: ErrorRegister, [a, b, c]: [u8; 3]) -> Emcy {
-            Emcy {
-                manufacturer: [a, b, c, 0, 0],
-                ..Emcy::new(EmcyCode(code), register)
-            }
-        }
         const NOBODY: [u8; 3] = [0; 3];
-        match self {
-            MasterError::Overrun => of(0x8110, COMMUNICATION, NOBODY),
-            MasterError::ErrorPassive => of(0x8120, COMMUNICATION, NOBODY),
-            MasterError::NodeLost { node } => of(0x8130, COMMUNICATION, [node.get(), 0, 0]),
-            MasterError::BusOffRecovered => of(0x8140, COMMUNICATION, NOBODY),
+        let (code, [a, b, c]) = match self {
+            MasterError::Overrun => (0x8110, NOBODY),
+            MasterError::ErrorPassive => (0x8120, NOBODY),
+            MasterError::NodeLost { node } => (0x8130, [node.get(), 0, 0]),
+            MasterError::BusOffRecovered => (0x8140, NOBODY),
             MasterError::PdoLength { node, tpdo, short } => {
                 let code = if short { 0x8210 } else { 0x8220 };
-                of(code, COMMUNICATION, [node.get(), tpdo, 0])
+                (code, [node.get(), tpdo, 0])
             }
-            MasterError::PdoMissing { node, tpdo } => {
-                of(Self::PDO_MISSING.0, COMMUNICATION, [node.get(), tpdo, 0])
+            MasterError::PdoMissing { node, tpdo } => (Self::PDO_MISSING.0, [node.get(), tpdo, 0]),
+            MasterError::Watchdog => (0x6010, NOBODY),
+            MasterError::Storage => (0x5530, NOBODY),
+            MasterError::BootFailed { node, letter } => {
+                (Self::BOOT_FAILED.0, [node.get(), letter, 0])
             }
-            MasterError::Watchdog => of(0x6010, GENERIC, NOBODY),
-            MasterError::Storage => of(0x5530, GENERIC, NOBODY),
-            MasterError::BootFailed { node, letter } => of(
-                Self::BOOT_FAILED.0,
-                OF_MANUFACTURER,
-                [node.get(), letter, 0],
-            ),
             MasterError::AxisFault { node, code } => {
                 let [low, high] = code.0.to_le_bytes();
-                of(Self::AXIS_FAULT.0, OF_MANUFACTURER, [node.get(), low, high])
+                (Self::AXIS_FAULT.0, [node.get(), low, high])
             }
+        };
+        // Codes of one group have their bit in common (CiA 301, 7.5.2.2).
+        let register = match code >> u8::BITS {
+            0x81..=0x82 => ErrorRegister::COMMUNICATION,
+            0xFF => ErrorRegister::MANUFACTURER,
+            _ => ErrorRegister::GENERIC,
+        };
+        Emcy {
+            manufacturer: [a, b, c, 0, 0],
+            ..Emcy::new(EmcyCode(code), register)
         }
     }
 }

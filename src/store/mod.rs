@@ -86,8 +86,8 @@ impl From<StoreError> for AbortCode {
 /// A record that was found good.
 #[derive(Clone, Copy, Debug)]
 struct Newest {
-    page: usize,
-    slot: u32,
+    /// Where it begins.
+    at: u32,
     sequence: u32,
     len: usize,
 }
@@ -102,11 +102,11 @@ pub struct Store<F> {
 }
 
 impl<F: NorFlash> Store<F> {
-    const SLOTS: u32 = (F::ERASE_SIZE / RECORD) as u32;
+    const PAGE: u32 = F::ERASE_SIZE as u32;
     const FITS: () = assert!(
         WORD.is_multiple_of(F::WRITE_SIZE)
             && WORD.is_multiple_of(F::READ_SIZE)
-            && F::ERASE_SIZE >= RECORD,
+            && F::ERASE_SIZE.is_multiple_of(RECORD),
         "the flash has words that are too long or pages that are too short"
     );
 
@@ -116,9 +116,9 @@ impl<F: NorFlash> Store<F> {
     /// [`StoreError::Pages`] unless they are two different pages of the flash.
     pub fn new(flash: F, pages: [u32; 2]) -> Result<Store<F>, StoreError> {
         const { Self::FITS }
-        let size = F::ERASE_SIZE as u32;
         let capacity = u32::try_from(flash.capacity()).unwrap_or(u32::MAX);
-        let fits = |at: u32| at.is_multiple_of(size) && capacity.saturating_sub(size) >= at;
+        let last = capacity.saturating_sub(Self::PAGE);
+        let fits = |at: u32| at.is_multiple_of(Self::PAGE) && last >= at;
         let [a, b] = pages;
         if a == b || !fits(a) || !fits(b) {
             return Err(StoreError::Pages);
@@ -128,9 +128,10 @@ impl<F: NorFlash> Store<F> {
             pages,
             newest: None,
         };
-        for page in 0..pages.len() {
-            for slot in 0..Self::SLOTS {
-                let found = store.check(page, slot);
+        for page in pages {
+            let mut at = page;
+            while at < page + Self::PAGE {
+                let found = store.check(at);
                 let newer = |found: &Newest| {
                     store
                         .newest
@@ -139,6 +140,7 @@ impl<F: NorFlash> Store<F> {
                 if found.as_ref().is_some_and(newer) {
                     store.newest = found;
                 }
+                at += RECORD as u32;
             }
         }
         Ok(store)
@@ -155,7 +157,7 @@ impl<F: NorFlash> Store<F> {
         };
         let len = newest.len;
         let into = buf.get_mut(..len).ok_or(StoreError::Buffer { len })?;
-        let mut at = self.address(newest.page, newest.slot);
+        let mut at = newest.at;
         for part in into.chunks_mut(WORD) {
             at += WORD as u32;
             let word = self.read(at).ok_or(StoreError::Flash)?;
@@ -179,21 +181,24 @@ impl<F: NorFlash> Store<F> {
         if len > CAPACITY {
             return Err(StoreError::TooLong { len });
         }
-        let sequence = self
-            .newest
-            .map_or(1, |newest| newest.sequence.wrapping_add(1));
-        if let Some(Newest { page, slot, .. }) = self.newest
-            && self.append(page, slot + 1, sequence, data).is_ok()
-        {
-            return Ok(());
-        }
-        // The other page: the one that holds the newest record stays.
-        let other = self.newest.map_or(0, |newest| 1 - newest.page);
-        let first = self.refill(other, sequence, data);
-        match (first, self.newest) {
-            (Err(_), None) => self.refill(1 - other, sequence, data),
-            (result, _) => result,
-        }
+        let (sequence, pages) = match self.newest {
+            None => (1, self.pages),
+            Some(newest) => {
+                let sequence = newest.sequence.wrapping_add(1);
+                let next = newest.at + RECORD as u32;
+                let page = newest.at - newest.at % Self::PAGE;
+                if self.append(next, page, sequence, data).is_ok() {
+                    return Ok(());
+                }
+                // The page that holds the newest record stays.
+                let [a, b] = self.pages;
+                let other = if page == a { b } else { a };
+                (sequence, [other; 2])
+            }
+        };
+        let [first, second] = pages;
+        self.refill(first, sequence, data)
+            .or_else(|_| self.refill(second, sequence, data))
     }
 
     /// The flash, given back.
@@ -201,29 +206,23 @@ impl<F: NorFlash> Store<F> {
         self.flash
     }
 
-    fn refill(&mut self, page: usize, sequence: u32, data: &[u8]) -> Result<(), StoreError> {
-        let at = self.address(page, 0);
-        let end = at + F::ERASE_SIZE as u32;
-        self.flash.erase(at, end).map_err(flash_error)?;
-        self.append(page, 0, sequence, data)
+    fn refill(&mut self, page: u32, sequence: u32, data: &[u8]) -> Result<(), StoreError> {
+        let end = page + Self::PAGE;
+        self.flash.erase(page, end).map_err(flash_error)?;
+        self.append(page, page, sequence, data)
     }
 
-    /// Writes the record into the first blank place from `slot` on that keeps it.
-    fn append(
-        &mut self,
-        page: usize,
-        slot: u32,
-        sequence: u32,
-        data: &[u8],
-    ) -> Result<(), StoreError> {
+    /// Writes the record into the first blank place of `page` from `at` on that
+    /// keeps it.
+    fn append(&mut self, at: u32, page: u32, sequence: u32, data: &[u8]) -> Result<(), StoreError> {
+        let mut at = at;
         let mut result = Err(StoreError::Worn);
-        for slot in slot..Self::SLOTS {
-            if !self.is_blank(page, slot) {
-                continue;
+        while at < page + Self::PAGE {
+            if self.is_blank(at) {
+                result = self.write(at, sequence, data);
             }
-            result = self.write(self.address(page, slot), sequence, data);
             if result.is_ok() {
-                let written = self.check(page, slot);
+                let written = self.check(at);
                 match written {
                     Some(new) if new.sequence == sequence && new.len == data.len() => {
                         self.newest = written;
@@ -232,6 +231,7 @@ impl<F: NorFlash> Store<F> {
                     _ => result = Err(StoreError::Worn),
                 }
             }
+            at += RECORD as u32;
         }
         result
     }
@@ -259,8 +259,8 @@ impl<F: NorFlash> Store<F> {
     }
 
     /// The record in this place, if it is whole.
-    fn check(&mut self, page: usize, slot: u32) -> Option<Newest> {
-        let mut at = self.address(page, slot);
+    fn check(&mut self, record: u32) -> Option<Newest> {
+        let mut at = record;
         let first = self.read(at)?;
         let len = usize::from((first >> LENGTH_AT) as u16);
         if first as u16 != MAGIC || len > CAPACITY {
@@ -274,16 +274,14 @@ impl<F: NorFlash> Store<F> {
         }
         let last = self.read(at + WORD as u32)?;
         (last == trailer(crc.value())).then_some(Newest {
-            page,
-            slot,
+            at: record,
             sequence: (first >> SEQUENCE_AT) as u32,
             len,
         })
     }
 
-    fn is_blank(&mut self, page: usize, slot: u32) -> bool {
+    fn is_blank(&mut self, at: u32) -> bool {
         const BLANK: u64 = u64::from_le_bytes([ERASED; WORD]);
-        let at = self.address(page, slot);
         (0..RECORD / WORD).all(|n| self.read(at + (n * WORD) as u32) == Some(BLANK))
     }
 
@@ -292,11 +290,6 @@ impl<F: NorFlash> Store<F> {
         let mut word = [0; WORD];
         self.flash.read(at, &mut word).ok()?;
         Some(u64::from_le_bytes(word))
-    }
-
-    fn address(&self, page: usize, slot: u32) -> u32 {
-        let page = self.pages.get(page).copied().unwrap_or_default();
-        page + slot * RECORD as u32
     }
 }
 

@@ -38,37 +38,36 @@ const CONSUMER_MS: u32 = 0xFFFF;
 const CONSUMER_PERCENT: u32 = 250;
 const HUNDRED: u32 = 100;
 
+/// What does not depend on the network.
+#[expect(
+    clippy::indexing_slicing,
+    reason = "a wrong place does not compile: this is a constant"
+)]
+const DESIGN: [u32; setting::OWN] = {
+    let mut own = [0; setting::OWN];
+    own[Setting::SyncCobId.place()] = SyncCobId::DEFAULT.0;
+    own[Setting::TimeCobId.place()] = TimeCobId::DEFAULT.0;
+    own[Setting::TimePeriod.place()] = TIME_PERIOD_MS;
+    // A lost node does not take the master down.
+    own[Setting::ErrorBehaviour.place()] = ErrorBehaviour::NoChange.code() as u32;
+    own[Setting::Startup.place()] = Startup::MASTER | Startup::START_ALL;
+    own
+};
+
 impl<const N: usize> Settings<N> {
     /// As the network's design has them.
     pub fn new(network: &Network) -> Settings<N> {
         let mut settings = Settings {
-            own: [0; setting::OWN],
+            own: DESIGN,
             consumers: [0; N],
             assignments: [0; N],
         };
-        for (setting, value) in [
-            (Setting::SyncCobId, SyncCobId::DEFAULT.0),
-            (Setting::SyncPeriod, network.cycle.as_micros()),
-            (Setting::TimeCobId, TimeCobId::DEFAULT.0),
-            (Setting::TimePeriod, TIME_PERIOD_MS),
-            (
-                Setting::EmcyCobId,
-                EmcyCobId::predefined(network.master.node).0,
-            ),
-            (
-                Setting::ProducerHeartbeat,
-                network.master.heartbeat.as_millis(),
-            ),
-            // A lost node does not take the master down.
-            (
-                Setting::ErrorBehaviour,
-                ErrorBehaviour::NoChange.code().into(),
-            ),
-            (Setting::Startup, Startup::MASTER | Startup::START_ALL),
-            (Setting::BootTime, network.master.boot_time.as_millis()),
-        ] {
-            settings.store(setting, value);
-        }
+        let master = &network.master;
+        let emcy = EmcyCobId::predefined(master.node);
+        settings.store(Setting::SyncPeriod, network.cycle.as_micros());
+        settings.store(Setting::EmcyCobId, emcy.0);
+        settings.store(Setting::ProducerHeartbeat, master.heartbeat.as_millis());
+        settings.store(Setting::BootTime, master.boot_time.as_millis());
         for (node, (consumer, assignment)) in network
             .nodes
             .iter()
