@@ -10,7 +10,6 @@ use super::settings::{Settings, Startup};
 use crate::frame::Frame;
 use crate::id::{CobId, FunctionCode, NodeId};
 use crate::network::Network;
-use crate::nmt::ErrorControl;
 use crate::time::{Duration, Instant};
 use core::mem::MaybeUninit;
 use heapless::{Deque, Vec};
@@ -152,6 +151,20 @@ impl<const N: usize> NetworkBoot<N> {
         self.ready
     }
 
+    /// The nodes that are operational, as far as they told: bit n for the one at
+    /// place n in the network.
+    pub fn operational(&self) -> u32 {
+        let bits = self.nodes.iter().rev();
+        bits.fold(0, |bits, node| bits << 1 | u32::from(node.is_operational()))
+    }
+
+    /// Whether a node of the list was given up, or not seen in its boot time.
+    pub fn any_given_up(&self) -> bool {
+        self.nodes
+            .iter()
+            .any(|node| node.has_given_up() && node.is(0))
+    }
+
     /// Whether a mandatory node failed in the start. Nothing leads out but a new
     /// start, or a [`request`](Self::request) to reset all nodes.
     pub fn is_failed(&self) -> bool {
@@ -189,32 +202,28 @@ impl<const N: usize> NetworkBoot<N> {
         };
         match function {
             FunctionCode::SdoResponse => node.on_sdo(frame, now),
-            FunctionCode::ErrorControl => {
-                if let Some(heard) = ErrorControl::decode(frame) {
-                    node.on_error_control(heard.state, now);
-                }
-            }
+            FunctionCode::ErrorControl => node.on_error_control(frame, now),
             _ => {}
         }
     }
 
     /// The heartbeat of a node stayed away, or it does not answer to node
-    /// guarding: whoever consumes it tells so.
-    pub fn node_lost(&mut self, id: NodeId) {
-        if let Some(node) = self.nodes.iter_mut().find(|boot| boot.node().id == id) {
-            node.lose(false);
-        }
+    /// guarding: whoever consumes it tells so. `false`: it is being booted, and
+    /// that is what it takes.
+    pub fn node_lost(&mut self, id: NodeId) -> bool {
+        let mut nodes = self.nodes.iter_mut();
+        nodes
+            .find(|boot| boot.node().id == id)
+            .is_some_and(|node| node.lose(false))
     }
 
     /// The controller is bus-off. After a pause [`Action::RestartController`]
-    /// comes, then the silent phase, and the nodes are booted again.
+    /// comes, then the silent phase, and the nodes are booted again, unless the
+    /// start was halted or another device is the master.
     pub fn bus_off(&mut self, now: Instant) {
-        if self.phase == Phase::NotMaster {
-            return;
-        }
         let pause = self.pauses.next(now);
         self.halted = match self.phase {
-            Phase::Failed | Phase::Stopped => Some(self.phase),
+            Phase::NotMaster | Phase::Failed | Phase::Stopped => Some(self.phase),
             Phase::BusOff { .. } => self.halted,
             _ => None,
         };

@@ -25,7 +25,7 @@ mod app {
         axes::Axes,
         control::Control,
         counters::{self, Counts},
-        duties::{act, begin, obey, order_boot, serve},
+        duties::{Silent, act, begin, follow, obey, order_boot, serve},
         filters::{self, Handler},
         leds,
         log::{self, Log, News, UPTIME_MS},
@@ -61,7 +61,7 @@ mod app {
     type OrderQueue = Queue<Order, { design::ORDER_QUEUE }>;
     type EventQueue = Queue<GroupEvent, { design::LOG_QUEUE }>;
 
-    static NETWORK: &Network = &sample::SIX_EPOS4;
+    pub(crate) static NETWORK: &Network = &sample::SIX_EPOS4;
     static CLOCK: ExtendedClock = ExtendedClock::new();
 
     #[shared]
@@ -309,7 +309,9 @@ mod app {
             let state = can_rx.error_state();
             cx.shared.bus.lock(|bus| *bus = state);
             if state == can::ErrorState::BusOff {
-                // Nothing that waits now may be sent when the bus is back.
+                // Nothing that waits now may be sent when the bus is back, and
+                // SYNC has to wait until the nodes are booted again.
+                cx.shared.od.lock(|od| od.set_sync_producer(false));
                 cx.shared.tx_queue.lock(TxQueue::clear);
                 cx.shared.can_tx.lock(can::Tx::cancel_all);
             }
@@ -365,11 +367,11 @@ mod app {
                 continue;
             };
             let to = match handler {
-                Handler::SdoResponse if transfer::wants(frame.id()) => {
+                Handler::Answer if transfer::wants(frame.id()) => {
                     transferred = true;
                     &mut *transfer_to
                 }
-                Handler::SdoResponse => {
+                Handler::Answer => {
                     answered = true;
                     &mut *answers_to
                 }
@@ -422,9 +424,6 @@ mod app {
             return;
         };
         let control = cx.shared.control.lock(Control::take);
-        if !control.leads() {
-            return;
-        }
         let axes = cx.local.axes;
         axes.read(&cycle, |slot| cx.shared.od.lock(|od| od.tpdo(slot)));
         axes.step(&control);
@@ -436,7 +435,7 @@ mod app {
         if control.window_us != 0 && cx.local.deadline.elapsed_us() > control.window_us {
             // What comes after the window of the SYNC is not sent any more.
             counters::RPDO_REPLACED.count();
-        } else if !control.bus_off {
+        } else if control.leads() && !control.bus_off {
             axes.write(
                 |frame| match cx.shared.tx_queue.lock(|queue| queue.put_latest(frame)) {
                     Ok(Put::Queued) => {}
@@ -495,16 +494,18 @@ mod app {
         let pressed = local.debounce.press(local.button.is_pressed());
         let control = cx.shared.control.lock(|control| {
             control.pressed |= pressed;
-            control.bus_off |= bus == can::ErrorState::BusOff;
+            control.bus_off = bus == can::ErrorState::BusOff;
             *control
         });
         if bus != *local.known_bus {
             *local.known_bus = bus;
             publish(local.news_to, News::ErrorState(bus));
         }
-        if control.network_ready {
-            local.supervisor.arm();
-        }
+        local.supervisor.arm(if control.network_ready {
+            control.operational
+        } else {
+            0
+        });
         while let Some(order) = local.orders.dequeue() {
             match order {
                 Order::Heartbeat(time) => *local.heartbeat_time = time,
@@ -516,6 +517,7 @@ mod app {
             local.heartbeat.set_period(*local.heartbeat_time, now);
         }
         if let Some(frame) = local.heartbeat.poll(now, control.state())
+            && control.speaking
             && !control.bus_off
         {
             // A full queue counts it.
@@ -561,13 +563,14 @@ mod app {
             reset_cause, clock, boot, answers, states, news, events, own, requests, orders_to,
             sync_period, store,
         ],
-        shared = [od, tx_queue, control, commands]
+        shared = [od, can_tx, tx_queue, control, commands]
     )]
     async fn sdo_configurator(mut cx: sdo_configurator::Context) {
         let local = cx.local;
         let mut wake = CONFIGURATOR.reader();
         let mut log = Log::new(NETWORK);
         log::started(*local.reset_cause);
+        let mut silent = Silent::default();
         defmt::info!(
             "silent for {=u32} ms, so that drives left running come to rest",
             NETWORK.master.silence.as_millis()
@@ -581,33 +584,6 @@ mod app {
         }
         begin(own, local.sync_period, local.orders_to, &mut cx.shared);
         loop {
-            // The time first, then one frame at a time: each may cause several
-            // actions, which are carried out before the next.
-            loop {
-                while let Some(action) = boot.poll(now(*local.clock)) {
-                    let period = &mut *local.sync_period;
-                    act(&action, own, period, &mut log, &mut cx.shared);
-                }
-                let state = || {
-                    local
-                        .states
-                        .dequeue()
-                        .inspect(|frame| own.error_control(frame))
-                };
-                let Some(frame) = local.answers.dequeue().or_else(state) else {
-                    break;
-                };
-                boot.on_frame(&frame, now(*local.clock));
-            }
-            while let Some(news) = local.news.dequeue() {
-                own.news(&news);
-                log.news(&news);
-            }
-            while let Some(event) = local.events.dequeue() {
-                own.group(&event);
-                log.group(&event);
-            }
-            let mut patience = design::CONFIGURATOR_PERIOD;
             while serve(
                 own,
                 boot,
@@ -625,14 +601,47 @@ mod app {
                         local.orders_to,
                         &mut cx.shared,
                     );
-                    if order_boot(&event, boot, own, now(*local.clock)) {
-                        // What it asks for is done in the next round.
-                        patience = Duration::ZERO;
-                    }
+                    order_boot(&event, boot, own, now(*local.clock));
                 }
             }
+            while let Some(news) = local.news.dequeue() {
+                // Who is just being booted has to be silent for a while.
+                if news.lost_node().is_none_or(|node| boot.node_lost(node)) {
+                    own.news(&news);
+                    log.news(&news);
+                }
+            }
+            while let Some(event) = local.events.dequeue() {
+                silent.group(&event, boot);
+                own.group(&event);
+                log.group(&event);
+            }
+            let bus_off = cx.shared.control.lock(|control| control.bus_off);
+            // The controller had the silent phase to come back in.
+            if bus_off && !boot.is_silent() {
+                boot.bus_off(now(*local.clock));
+            }
+            // The time first, then one frame at a time: each may cause several
+            // actions, which are carried out before the next.
+            loop {
+                while let Some(action) = boot.poll(now(*local.clock)) {
+                    let period = &mut *local.sync_period;
+                    act(&action, own, period, &mut log, &mut cx.shared);
+                }
+                follow(boot, own, &mut cx.shared);
+                let state = || {
+                    local
+                        .states
+                        .dequeue()
+                        .inspect(|frame| own.error_control(frame))
+                };
+                let Some(frame) = local.answers.dequeue().or_else(state) else {
+                    break;
+                };
+                boot.on_frame(&frame, now(*local.clock));
+            }
             roll::check_in(Task::SdoConfigurator);
-            let latest = now(*local.clock) + patience;
+            let latest = now(*local.clock) + design::CONFIGURATOR_PERIOD;
             let next = [boot.next_deadline(), own.device.next_deadline()];
             let next = next.into_iter().flatten().fold(latest, Instant::min);
             CONFIGURATOR.at(next.as_micros() as u32);

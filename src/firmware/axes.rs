@@ -47,11 +47,14 @@ impl Axes {
     pub(crate) fn step(&mut self, control: &Control) {
         let moving = self.group.state() == GroupState::Moving;
         let request = Request {
-            // After bus-off the way back is a reset of the board.
-            network_ready: control.network_ready && !control.bus_off && !control.cycle_differs,
+            network_ready: control.network_ready
+                && control.leads()
+                && !control.bus_off
+                && !control.cycle_differs,
             release: control.pressed && !moving,
             stop: control.pressed && moving,
             fault: control.fault,
+            absent: !control.operational,
         };
         self.group.step(request, &self.feedback, &mut self.commands);
     }

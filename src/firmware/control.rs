@@ -1,6 +1,11 @@
 //! What the slower tasks tell the PDO producer and each other.
 
-use canmaster::{boot::Event, motion::FaultCause, nmt};
+use canmaster::{
+    boot::{Event, NetworkBoot},
+    design::AXES,
+    motion::FaultCause,
+    nmt,
+};
 
 /// Shared by `pdo_producer`, `network` and `sdo_configurator`.
 #[expect(unreachable_pub, reason = "RTIC wants shared resources to be public")]
@@ -8,17 +13,21 @@ use canmaster::{boot::Event, motion::FaultCause, nmt};
 pub struct Control {
     /// The silent phase is over: the master may speak.
     pub(crate) speaking: bool,
-    /// NMT start was sent: RPDOs go out every cycle.
+    /// NMT start was sent, or is left to others: RPDOs go out every cycle.
     pub(crate) started: bool,
     /// Every mandatory node is checked, configured and operational.
     pub(crate) network_ready: bool,
+    /// The nodes that are operational: bit n for axis n.
+    pub(crate) operational: u32,
+    /// A node was given up: it counts as lost, even if it was never seen.
+    pub(crate) node_missing: bool,
     /// The button was pressed.
     pub(crate) pressed: bool,
     /// A fault seen outside the group that it does not know of yet.
     pub(crate) fault: Option<(usize, FaultCause)>,
     /// A mandatory node could not be booted.
     pub(crate) boot_failed: bool,
-    /// The controller is or was bus-off.
+    /// The controller is bus-off.
     pub(crate) bus_off: bool,
     /// An axis is or is being enabled.
     pub(crate) axes_enabled: bool,
@@ -37,6 +46,8 @@ impl Control {
             speaking: false,
             started: false,
             network_ready: false,
+            operational: 0,
+            node_missing: false,
             pressed: false,
             fault: None,
             boot_failed: false,
@@ -51,15 +62,25 @@ impl Control {
     /// Takes note of a step of the boot-up.
     pub(crate) fn boot(&mut self, event: &Event) {
         match event {
-            Event::ResetSent => self.speaking = true,
-            Event::StartSent => {
+            Event::StartSent | Event::StartLeft => {
                 self.started = true;
                 self.commanded = None;
             }
-            Event::NetworkReady => self.network_ready = true,
-            Event::NetworkFailed => self.boot_failed = true,
+            Event::BusOff { .. } => (self.speaking, self.started) = (false, false),
             _ => {}
         }
+    }
+
+    /// Takes note of where the boot-up stands. `true`: the master may speak from
+    /// now on.
+    pub(crate) fn follow(&mut self, boot: &NetworkBoot<AXES>) -> bool {
+        self.network_ready = boot.is_ready();
+        self.operational = boot.operational();
+        self.node_missing = boot.any_given_up();
+        self.boot_failed = boot.is_failed();
+        let silent = !self.speaking;
+        self.speaking |= !boot.is_silent();
+        silent && self.speaking
     }
 
     /// The NMT state of the board itself.

@@ -2,21 +2,22 @@
 //! with what the tasks share.
 
 use crate::{
-    app::app::sdo_configurator::SharedResources as Shared,
+    app::app::{NETWORK, sdo_configurator::SharedResources as Shared},
     log::Log,
     own_node::{Mirror, Order, OwnNode, Storage},
 };
 use canmaster::{
     Frame,
-    boot::{self, Action, NetworkBoot},
+    boot::{Action, NetworkBoot},
     design::{self, AXES},
     device::{Event, Setting},
-    master::TpdoSlots,
+    master::TxQueue,
+    motion::{FaultCause, GroupEvent, GroupState},
     nmt::{Command, NodeControl, Service, State, Target},
     time::Instant,
 };
 use heapless::spsc::{Consumer, Producer};
-use nucleo_g474re::{pac::Interrupt, timers};
+use nucleo_g474re::{can, pac::Interrupt, timers};
 use rtic::Mutex;
 
 /// The board's own services: takes in one frame, sends one frame. `false`:
@@ -79,13 +80,13 @@ pub(crate) fn obey(
 }
 
 /// Hands on what a client has caused to the boot-up, which sends all NMT
-/// commands. `true`: it has something to do.
+/// commands at its next poll.
 pub(crate) fn order_boot(
     event: &Event,
     boot: &mut NetworkBoot<AXES>,
     own: &mut OwnNode,
     now: Instant,
-) -> bool {
+) {
     let control = match *event {
         Event::Nmt(control) => {
             own.command(control);
@@ -93,7 +94,7 @@ pub(crate) fn order_boot(
             // starts the network.
             let mine = control.target == Target::Node(own.network().master.node);
             if mine && (control.command != Command::Start || !own.device.is_master()) {
-                return false;
+                return;
             }
             control
         }
@@ -103,18 +104,15 @@ pub(crate) fn order_boot(
             target,
         },
         Event::Changed(Setting::Startup | Setting::Assignment(_) | Setting::BootTime) => {
-            boot.set_settings(&own.device.settings().boot());
-            return true;
+            return boot.set_settings(&own.device.settings().boot());
         }
-        _ => return false,
+        _ => return,
     };
     // The client was refused what it would refuse (`Mirror::may_request`).
     let _ = boot.request(control, now);
-    true
 }
 
-/// Takes over the settings that were loaded, before the network is started. A
-/// board that is not the NMT master has no network to wait for.
+/// Takes over the settings that were loaded, before the network is started.
 pub(crate) fn begin(
     own: &OwnNode,
     period: &mut timers::SyncPeriod,
@@ -128,15 +126,14 @@ pub(crate) fn begin(
     ] {
         obey(&Event::Changed(setting), own, period, orders, shared);
     }
-    if !own.device.is_master() {
-        speak(own.boot_up(), shared);
-    }
 }
 
-/// The board leaves initialising, with its boot-up message.
-fn speak(boot_up: Frame, shared: &mut Shared<'_>) {
-    send(boot_up, shared);
-    shared.control.lock(|control| control.speaking = true);
+/// Tells the other tasks where the boot-up stands. When its silence is over, the
+/// board leaves initialising, with its boot-up message.
+pub(crate) fn follow(boot: &NetworkBoot<AXES>, own: &OwnNode, shared: &mut Shared<'_>) {
+    if shared.control.lock(|control| control.follow(boot)) {
+        send(own.boot_up(), shared);
+    }
 }
 
 /// Takes over a setting that a client has changed.
@@ -195,20 +192,44 @@ pub(crate) fn act(
             own.device.set_sync_producer(true);
             take_over(Setting::SyncCobId, own, period, shared);
         }
-        // Only asked for after `NetworkBoot::bus_off`, which nobody calls: the
-        // controller stays bus-off until the board is reset.
-        Action::RestartController => {}
+        Action::RestartController => {
+            shared.tx_queue.lock(TxQueue::clear);
+            shared.can_tx.lock(can::Tx::restart);
+        }
         Action::Report(event) => {
             own.boot(event);
-            if *event == boot::Event::ResetSent && !shared.control.lock(|control| control.speaking)
-            {
-                speak(own.boot_up(), shared);
-            }
-            if matches!(event, boot::Event::StartSent) {
-                shared.od.lock(|od| od.expect(TpdoSlots::all_of(AXES)));
-            }
             shared.control.lock(|control| control.boot(event));
             log.boot(event);
+        }
+    }
+}
+
+/// Axes whose TPDOs stay away: whatever their heartbeats say, they are of no use
+/// as they are. One bit for each.
+#[derive(Default)]
+pub(crate) struct Silent(u32);
+
+impl Silent {
+    /// Takes note of what the group reports. When everything stands, the nodes of
+    /// these axes are booted again.
+    pub(crate) fn group(&mut self, event: &GroupEvent, boot: &mut NetworkBoot<AXES>) {
+        match *event {
+            GroupEvent::Fault {
+                axis: Some(axis),
+                cause: FaultCause::TpdoMissing { .. },
+            } => self.0 |= 1 << axis,
+            GroupEvent::State {
+                to: GroupState::Faulted,
+                ..
+            } => {
+                for (axis, node) in NETWORK.nodes.iter().enumerate() {
+                    if self.0 & 1 << axis != 0 {
+                        boot.node_lost(node.id);
+                    }
+                }
+                self.0 = 0;
+            }
+            _ => {}
         }
     }
 }

@@ -11,8 +11,8 @@ pub(crate) enum Handler {
     /// A TPDO: 0 for TPDO1, 1 for TPDO2.
     Tpdo(usize),
     Emcy,
-    /// For the boot-up: an answer of an SDO server or of an LSS slave.
-    SdoResponse,
+    /// To something that `sdo_configurator` asked: SDO, LSS.
+    Answer,
     /// Boot-up and heartbeat.
     ErrorControl,
     /// For the board itself: an SDO request, TIME, NMT.
@@ -58,10 +58,10 @@ pub(crate) static HANDLERS: [Handler; FILTERS.len()] = [
     Handler::Tpdo(0),
     Handler::Tpdo(1),
     Handler::Emcy,
-    Handler::SdoResponse,
+    Handler::Answer,
     Handler::ErrorControl,
     Handler::Request,
     Handler::Request,
     Handler::Request,
-    Handler::SdoResponse,
+    Handler::Answer,
 ];

@@ -18,7 +18,7 @@ pub(crate) fn run(control: &Control, now: Instant) -> bool {
 pub(crate) fn error(control: &Control, bus: ErrorState, node_lost: bool, now: Instant) -> bool {
     let errors = Errors {
         bus_off: control.bus_off,
-        error_control: node_lost,
+        error_control: node_lost || control.node_missing,
         warning_limit: bus != ErrorState::Active,
         configuration: control.boot_failed,
         ..Errors::default()

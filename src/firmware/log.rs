@@ -4,8 +4,9 @@
 
 use crate::counters::Counts;
 use canmaster::{
+    NodeId,
     boot::Event,
-    master::Report,
+    master::{Notice, Report},
     motion::{FaultCause, GroupEvent, GroupState},
     network::Network,
 };
@@ -56,6 +57,20 @@ pub(crate) enum News {
     Counts(Counts),
 }
 
+impl News {
+    /// A node of the network whose heartbeat stays away.
+    pub(crate) const fn lost_node(&self) -> Option<NodeId> {
+        match self {
+            News::Node(Report {
+                axis: Some(_),
+                notice: Notice::HeartbeatLost(lost),
+                ..
+            }) => Some(lost.node),
+            _ => None,
+        }
+    }
+}
+
 /// Writes the log.
 pub(crate) struct Log {
     network: &'static Network,
@@ -92,7 +107,7 @@ impl Log {
             News::Node(report) => self.report(report),
             News::ErrorState(ErrorState::BusOff) => fault!(
                 self,
-                "CAN controller bus-off: check CAN_H and CAN_L for a short or exchanged wires, the termination, and the bit rate of every node; then reset the board"
+                "CAN controller bus-off: check CAN_H and CAN_L for a short or exchanged wires, the termination, and the bit rate of every node"
             ),
             News::ErrorState(ErrorState::Passive) => {
                 warn!(
@@ -146,27 +161,27 @@ impl Log {
                 axis: Some(axis),
                 cause,
             } => match self.network.nodes.get(usize::from(*axis)) {
-                Some(node) => fault!(
-                    self,
-                    "node {} ({=str}): {}; then reset the board",
-                    node.id,
-                    node.name,
-                    cause
-                ),
+                Some(node) => {
+                    fault!(self, "node {} ({=str}): {}", node.id, node.name, cause);
+                }
                 None => fault!(self, "{}", event),
             },
-            GroupEvent::Fault { .. } => fault!(self, "{}; then reset the board", event),
+            GroupEvent::Fault { .. } => fault!(self, "{}", event),
             GroupEvent::State {
                 to: GroupState::Standby,
                 ..
             } => {
+                self.faulted = false;
                 info!("{}: press B1 to start the motion", event);
             }
             GroupEvent::State {
                 to: GroupState::Faulted,
                 ..
             } => {
-                warn!("{}: reset the board to start again", event);
+                warn!(
+                    "{}: a lost node is booted again by itself, else reset the node (1F82h) or the board",
+                    event
+                );
             }
             GroupEvent::ReleaseRefused(_)
             | GroupEvent::Coasting { .. }

@@ -271,6 +271,12 @@ impl OwnNode {
         if let Event::Operational(node) | Event::NodeBack(node) = *event {
             let code = MasterError::BOOT_FAILED;
             self.device.clear_all(code, Some(node));
+            self.device.clear(MasterError::NodeLost { node });
+        }
+        match *event {
+            Event::NodeLost(node) => self.device.raise(MasterError::NodeLost { node }),
+            Event::BusOff { .. } => self.device.set_sync_producer(false),
+            _ => {}
         }
     }
 

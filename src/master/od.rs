@@ -128,14 +128,14 @@ pub struct MasterOd<const AXES: usize> {
 }
 
 impl<const AXES: usize> MasterOd<AXES> {
-    /// SYNC off, nothing expected. `lengths` are the mapped bytes of each TPDO
-    /// of each axis.
+    /// SYNC off. `lengths` are the mapped bytes of each TPDO of each axis, each of
+    /// which every SYNC has to bring.
     pub const fn new(lengths: &'static [[u8; TPDOS_PER_AXIS]; AXES]) -> MasterOd<AXES> {
         MasterOd {
             sync_producer: false,
             sync_count: 0,
             sync_counter: SyncCounter::NONE,
-            expected: TpdoSlots::NONE,
+            expected: TpdoSlots::all_of(AXES),
             received: TpdoSlots::NONE,
             open: false,
             overruns: 0,
@@ -174,11 +174,6 @@ impl<const AXES: usize> MasterOd<AXES> {
     /// Cycles that were not taken up before the next SYNC.
     pub fn overruns(&self) -> u32 {
         self.overruns
-    }
-
-    /// The TPDOs that each SYNC has to bring from now on.
-    pub fn expect(&mut self, slots: TpdoSlots) {
-        self.expected = slots;
     }
 
     /// The last TPDO of another length than mapped, once.
@@ -234,13 +229,17 @@ impl<const AXES: usize> MasterOd<AXES> {
     }
 
     /// Takes up the cycle: once per SYNC, as soon as every expected TPDO is in,
-    /// or at the deadline with what there is. While none is expected, the
-    /// deadline alone decides.
+    /// or at the deadline with what there is. While SYNC is off, the deadline is
+    /// a cycle in which every TPDO is missing: time goes on for the axes.
     #[inline]
     pub fn take_cycle(&mut self, deadline: bool) -> Option<Cycle> {
-        let missing = self.missing();
-        let complete = missing.is_empty() && !self.expected.is_empty();
-        if !self.open || !(complete || deadline) {
+        let (missing, due) = if self.sync_producer {
+            let missing = self.missing();
+            (missing, self.open && (missing.is_empty() || deadline))
+        } else {
+            (self.expected, deadline)
+        };
+        if !due {
             return None;
         }
         self.open = false;
@@ -274,7 +273,6 @@ mod tests {
     fn running() -> MasterOd<2> {
         let mut od = MasterOd::new(&LENGTHS);
         od.set_sync_producer(true);
-        od.expect(TpdoSlots::all_of(2));
         od
     }
 
@@ -295,12 +293,21 @@ mod tests {
     }
 
     #[test]
-    fn no_cycle_without_a_sync() {
+    fn without_sync_the_deadline_alone_makes_the_cycle() {
         let mut od = MasterOd::<2>::new(&LENGTHS);
         assert!(!od.sync_producer());
-        assert_eq!(od.take_cycle(true), None);
+        assert_eq!(od.take_cycle(false), None);
+        for slot in TpdoSlots::all_of(2).iter() {
+            od.store(slot, [1; 8], 6);
+        }
+        assert_eq!(od.take_cycle(false), None);
+        for _ in 0..2 {
+            let cycle = od.take_cycle(true).unwrap();
+            assert_eq!(cycle.missing, TpdoSlots::all_of(2));
+        }
         od.set_sync_producer(true);
         assert!(od.sync_producer());
+        assert_eq!(od.take_cycle(true), None);
         od.open_cycle();
         assert_eq!(od.sync_count(), 1);
     }
@@ -335,15 +342,6 @@ mod tests {
         od.store(slot(0, 1), [3; 8], 6);
         assert_eq!(od.store(slot(1, 1), [3; 8], 6), Reception::Stored);
         assert_eq!(od.take_cycle(true), None);
-    }
-
-    #[test]
-    fn without_expectation_the_deadline_alone_decides() {
-        let mut od = running();
-        od.expect(TpdoSlots::NONE);
-        od.open_cycle();
-        assert_eq!(od.take_cycle(false), None);
-        assert!(od.take_cycle(true).is_some());
     }
 
     #[test]

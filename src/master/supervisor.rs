@@ -30,7 +30,8 @@ pub enum Notice {
     },
     /// The heartbeat stayed away (CiA 301, 7.2.8.3.2.2).
     HeartbeatLost(Lost),
-    /// The heartbeat is back, but the group needs more than that.
+    /// The heartbeat of a node that the network does not name is back. Of the
+    /// others the boot-up tells that.
     HeartbeatBack(NodeId),
     /// A boot-up message after the network was started: the node was reset, or
     /// lost its supply.
@@ -78,7 +79,7 @@ impl Notice {
                 Class::Fault => Advice::RemoveCause,
             },
             Notice::HeartbeatLost(_) => Advice::CheckCable,
-            Notice::HeartbeatBack(_) => Advice::Restart,
+            Notice::HeartbeatBack(_) => Advice::None,
             Notice::BootUp(_) => Advice::CheckSupply,
             Notice::NotOperational { .. } => Advice::FindMaster,
         }
@@ -109,8 +110,6 @@ pub enum Advice {
     RemoveCause,
     /// The node is not heard.
     CheckCable,
-    /// The node is heard again.
-    Restart,
     /// The node was reset.
     CheckSupply,
     /// Somebody else commands the node.
@@ -120,13 +119,10 @@ pub enum Advice {
 in_words!(Advice {
     Advice::None => ("nothing to do"),
     Advice::GoesOn => ("the drive goes on"),
-    Advice::RemoveCause => ("remove the cause, then reset the board"),
-    Advice::CheckCable => ("check its cable and supply, then reset the board"),
-    Advice::Restart => ("reset the board to use it"),
-    Advice::CheckSupply => (
-        "it was reset or lost its supply: check that, then reset the board"
-    ),
-    Advice::FindMaster => ("look for another master on the bus, then reset the board"),
+    Advice::RemoveCause => ("remove the cause, then reset the node (1F82h) or the board"),
+    Advice::CheckCable => ("check its cable and supply"),
+    Advice::CheckSupply => ("it was reset or lost its supply: check that"),
+    Advice::FindMaster => ("look for another master on the bus"),
 });
 
 /// A notice, and the axis that it is about.
@@ -136,49 +132,31 @@ pub struct Report {
     pub axis: Option<usize>,
     /// What happened.
     pub notice: Notice,
-    /// Why the group has to stop for it. `None` if it need not, and before the
-    /// network was started: what a drive says then, as that it missed the master
-    /// while that was reset, is overcome by the start.
+    /// Why the group has to stop for it. `None` if it need not, and while the
+    /// node need not be operational: what a drive says then, as that it missed
+    /// the master while that was reset, is overcome by its boot-up.
     pub fault: Option<FaultCause>,
 }
 
 #[derive(Debug)]
 struct Watched {
     consumer: Consumer,
+    /// It has to be operational: whatever else it is, is a fault.
+    armed: bool,
     /// That it is not operational has been reported.
     reported: bool,
-    /// What happened before [`arm`](Supervisor::arm) and has not been put right
-    /// since: a fault as soon as it counts.
-    owed: Option<Notice>,
-}
-
-impl Watched {
-    /// What has to be said of it now.
-    fn poll(&mut self, armed: bool, now: Instant) -> Option<Notice> {
-        if armed && let Some(owed) = self.owed.take() {
-            self.reported |= matches!(owed, Notice::BootUp(_));
-            return Some(owed);
-        }
-        let lost = Notice::HeartbeatLost(self.consumer.poll(now)?);
-        if !armed {
-            self.owed = Some(lost);
-        }
-        Some(lost)
-    }
 }
 
 /// Supervises up to `N` nodes.
 #[derive(Debug)]
 pub struct Supervisor<const N: usize> {
     nodes: Vec<Watched, N>,
-    /// The network was started: whoever is not operational now is a fault.
-    armed: bool,
     /// A node that the network does not name, and 1016h does.
     other: Option<Consumer>,
 }
 
 impl<const N: usize> Supervisor<N> {
-    /// Supervises the first `N` nodes of `network`. While it boots, boot-up
+    /// Supervises the first `N` nodes of `network`. While they boot, boot-up
     /// messages and states are what they should be; [`arm`](Self::arm) ends
     /// that.
     pub fn new(network: &Network) -> Supervisor<N> {
@@ -187,22 +165,26 @@ impl<const N: usize> Supervisor<N> {
             let time = Duration::from_micros(producer_us / HUNDRED * CONSUMER_PERCENT);
             Watched {
                 consumer: Consumer::new(node.id, time),
+                armed: false,
                 reported: false,
-                owed: None,
             }
         });
         Supervisor {
             nodes: watched.collect(),
-            armed: false,
             other: None,
         }
     }
 
-    /// The network runs: from now on every node has to stay operational. One
-    /// that fell silent or was reset before, and was not heard again, is reported
-    /// by the next [`poll`](Self::poll).
-    pub fn arm(&mut self) {
-        self.armed = true;
+    /// Which nodes have to stay operational from now on: bit n for the one at
+    /// place n. Whoever was lost is watched again as soon as its bit is back.
+    pub fn arm(&mut self, operational: u32) {
+        for (place, node) in self.nodes.iter_mut().enumerate() {
+            let armed = operational
+                .checked_shr(place as u32)
+                .is_some_and(|bits| bits & 1 != 0);
+            node.reported &= node.armed || !armed;
+            node.armed = armed;
+        }
     }
 
     /// Whether the heartbeat of any node is lost.
@@ -222,31 +204,19 @@ impl<const N: usize> Supervisor<N> {
             other.heard(state, now);
             return was_lost.then(|| self.report(None, Notice::HeartbeatBack(node)));
         }
-        let armed = self.armed;
         let (axis, watched) = self
             .nodes
             .iter_mut()
             .enumerate()
             .find(|(_, watched)| watched.consumer.node() == node)?;
-        let was_lost = watched.consumer.is_lost();
         let heard = watched.consumer.heard(state, now);
-        let owed = watched.owed.take();
-        if !armed {
-            watched.owed = matches!(heard, Heard::BootUp { .. }).then_some(Notice::BootUp(node));
+        if watched.reported || !watched.armed {
             return None;
         }
-        let notice = if was_lost && owed.is_none() {
-            // Its loss was a fault already; whatever it is now cannot be worse.
-            watched.reported = true;
-            Notice::HeartbeatBack(node)
-        } else if watched.reported {
-            return None;
-        } else {
-            match heard {
-                Heard::BootUp { .. } => Notice::BootUp(node),
-                _ if state != State::Operational => Notice::NotOperational { node, state },
-                _ => return None,
-            }
+        let notice = match heard {
+            Heard::BootUp { .. } => Notice::BootUp(node),
+            _ if state != State::Operational => Notice::NotOperational { node, state },
+            _ => return None,
         };
         watched.reported = true;
         Some(self.report(Some(axis), notice))
@@ -258,13 +228,14 @@ impl<const N: usize> Supervisor<N> {
         if let Some(lost) = self.other.as_mut().and_then(|other| other.poll(now)) {
             return Some(self.report(None, Notice::HeartbeatLost(lost)));
         }
-        let armed = self.armed;
-        let (axis, notice) = self
-            .nodes
-            .iter_mut()
-            .enumerate()
-            .find_map(|(axis, watched)| Some((axis, watched.poll(armed, now)?)))?;
-        Some(self.report(Some(axis), notice))
+        let mut nodes = self.nodes.iter_mut().enumerate();
+        let (axis, lost) = nodes.find_map(|(axis, watched)| {
+            let lost = watched.consumer.poll(now)?;
+            // Whatever it is when it is heard again cannot be worse.
+            watched.reported = true;
+            Some((axis, lost))
+        })?;
+        Some(self.report(Some(axis), Notice::HeartbeatLost(lost)))
     }
 
     /// The heartbeat of `node` may stay away for `time` from now on; zero: for
@@ -282,8 +253,9 @@ impl<const N: usize> Supervisor<N> {
     }
 
     fn report(&self, axis: Option<usize>, notice: Notice) -> Report {
-        let counts = self.armed && axis.is_some();
-        let fault = if counts { notice.fault() } else { None };
+        let watched = axis.and_then(|axis| self.nodes.get(axis));
+        let armed = watched.is_some_and(|watched| watched.armed);
+        let fault = if armed { notice.fault() } else { None };
         Report {
             axis,
             notice,
@@ -300,6 +272,8 @@ mod tests {
     use std::string::ToString;
 
     const NODE: NodeId = NodeId::constant::<3>();
+    const ALL: u32 = 0b11_1111;
+    const OTHERS: u32 = 0b11_1011;
 
     fn at(ms: u64) -> Instant {
         Instant::from_micros(ms * 1000)
@@ -318,7 +292,7 @@ mod tests {
         ] {
             assert_eq!(supervisor.on_frame(&heartbeat(state), at(ms)), None);
         }
-        supervisor.arm();
+        supervisor.arm(ALL);
         supervisor
     }
 
@@ -348,8 +322,9 @@ mod tests {
         assert_eq!(report.notice.fault(), Some(FaultCause::HeartbeatLost));
         assert_eq!(supervisor.poll(at(1000)), None);
         assert!(supervisor.any_lost());
-        let notice = only(&mut supervisor, &heartbeat(State::Operational), 1100);
-        assert_eq!(notice.fault(), None);
+        let frame = heartbeat(State::PreOperational);
+        assert_eq!(supervisor.on_frame(&frame, at(1100)), None);
+        assert!(!supervisor.any_lost());
     }
 
     #[test]
@@ -429,33 +404,41 @@ mod tests {
     }
 
     #[test]
-    fn what_happened_just_before_the_start_counts_from_then_on() {
-        for (last, fault) in [
-            (State::Operational, FaultCause::HeartbeatLost),
-            (State::Initialising, FaultCause::LeftOperational),
+    fn what_a_node_does_while_it_is_booted_again_is_no_fault() {
+        let mut supervisor = running();
+        supervisor.on_frame(&heartbeat(State::Initialising), at(300));
+        supervisor.arm(OTHERS);
+        for (ms, state) in [
+            (310, State::Initialising),
+            (400, State::PreOperational),
+            (500, State::Operational),
         ] {
-            let mut supervisor = Supervisor::<6>::new(&SIX_EPOS4);
-            supervisor.on_frame(&heartbeat(State::Operational), at(0));
-            supervisor.on_frame(&heartbeat(last), at(100));
-            let early = supervisor.poll(at(400));
-            assert_eq!(early.and_then(|report| report.fault), None);
-            supervisor.arm();
-            let report = supervisor.poll(at(401)).unwrap();
-            assert_eq!((report.axis, report.fault), (Some(2), Some(fault)));
-            assert_eq!(supervisor.poll(at(402)), None);
+            assert_eq!(supervisor.on_frame(&heartbeat(state), at(ms)), None);
         }
+        // Its own loss is told all the same, so that it is booted again.
+        let report = supervisor.poll(at(750)).unwrap();
+        assert!(matches!(report.notice, Notice::HeartbeatLost(_)));
+        assert_eq!(report.fault, None);
+        // The others are watched as before.
+        let other = ErrorControl::heartbeat(NodeId::constant::<5>(), State::PreOperational);
+        let report = supervisor.on_frame(&other.frame(), at(760)).unwrap();
+        assert_eq!(report.fault, Some(FaultCause::LeftOperational));
     }
 
     #[test]
-    fn what_was_put_right_before_the_start_is_forgotten() {
-        let mut supervisor = Supervisor::<6>::new(&SIX_EPOS4);
-        supervisor.on_frame(&heartbeat(State::PreOperational), at(0));
-        assert!(supervisor.poll(at(400)).is_some());
-        supervisor.on_frame(&heartbeat(State::Operational), at(500));
-        supervisor.arm();
-        assert_eq!(supervisor.poll(at(501)), None);
-        let notice = only(&mut supervisor, &heartbeat(State::PreOperational), 600);
-        assert_eq!(notice.fault(), Some(FaultCause::LeftOperational));
+    fn a_node_that_is_back_is_watched_again() {
+        let mut supervisor = running();
+        for ms in [300, 600] {
+            supervisor.arm(ALL);
+            let notice = only(&mut supervisor, &heartbeat(State::PreOperational), ms);
+            assert_eq!(notice.fault(), Some(FaultCause::LeftOperational));
+            supervisor.arm(ALL);
+            let frame = heartbeat(State::PreOperational);
+            assert_eq!(supervisor.on_frame(&frame, at(ms + 100)), None, "told once");
+            supervisor.arm(OTHERS);
+            let frame = heartbeat(State::Operational);
+            assert_eq!(supervisor.on_frame(&frame, at(ms + 200)), None);
+        }
     }
 
     #[test]
@@ -468,7 +451,7 @@ mod tests {
         );
         assert_eq!(
             notice.advice().to_string(),
-            "remove the cause, then reset the board"
+            "remove the cause, then reset the node (1F82h) or the board"
         );
     }
 }

@@ -6,6 +6,7 @@ mod anything;
 mod bus_off;
 mod configuration;
 mod factory;
+mod guarding;
 mod letters;
 mod lost;
 mod networks;

@@ -53,7 +53,9 @@ fn apply(rig: &mut Rig, stimulus: &Stimulus, deaf: Option<u16>) {
             }
         }
         Stimulus::Wait(span) => rig.run_for(ms(*span)),
-        Stimulus::Lost(node) => rig.boot.node_lost(id(*node)),
+        Stimulus::Lost(node) => {
+            rig.boot.node_lost(id(*node));
+        }
         Stimulus::BusOff => rig.boot.bus_off(rig.now),
         Stimulus::Request(node, command) => {
             let command = Command::from_code(*command);

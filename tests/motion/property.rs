@@ -36,15 +36,15 @@ proptest! {
     #[test]
     fn without_release_every_velocity_is_zero(
         steps in prop::collection::vec(
-            (prop::array::uniform6(feedback()), prop::bool::weighted(0.9), any::<bool>(), 0u8..50),
+            (prop::array::uniform6(feedback()), prop::bool::weighted(0.9), any::<bool>(), 0u8..50, prop::bits::u32::masked(0b10_0001)),
             1..120,
         ),
     ) {
         let mut group = Group::new(&GROUP);
         let mut out = [AxisCommand::default(); AXES];
-        for (feedback, network_ready, stop, fault) in steps {
+        for (feedback, network_ready, stop, fault, absent) in steps {
             let fault = (fault == 0).then_some((2, FaultCause::HeartbeatLost));
-            let request = Request { network_ready, release: false, stop, fault };
+            let request = Request { network_ready, release: false, stop, fault, absent };
             group.step(request, &feedback, &mut out);
             prop_assert!(out.iter().all(|c| c.velocity == 0));
             prop_assert!(out.iter().all(|c| c.acceleration > 0 && c.deceleration > 0));
@@ -62,6 +62,7 @@ fn velocities_follow_releases_only() {
         let mut random = Random::new(seed + 1_000_000);
         let mut rig = Rig::new(seed);
         let mut network_ready = false;
+        let mut absent = 0;
         for _ in 0..600 {
             let axis = random.below(AXES as u64) as usize;
             match random.below(600) {
@@ -70,6 +71,8 @@ fn velocities_follow_releases_only() {
                 3..60 => rig.silent = [false; AXES],
                 60 => network_ready = false,
                 61..90 => network_ready = true,
+                90 => absent = 1 << axis,
+                91..110 => absent = 0,
                 _ => {}
             }
             let request = Request {
@@ -77,6 +80,7 @@ fn velocities_follow_releases_only() {
                 release: random.below(40) == 0,
                 stop: random.below(200) == 0,
                 fault: (random.below(600) == 0).then_some((axis, FaultCause::HeartbeatLost)),
+                absent,
             };
             let before = rig.group.state();
             rig.step(request);

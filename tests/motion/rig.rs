@@ -144,4 +144,5 @@ pub(crate) const READY: Request = Request {
     release: false,
     stop: false,
     fault: None,
+    absent: 0,
 };

@@ -50,7 +50,7 @@ pub struct RangeFilter {
 fn registers() -> &'static RegisterBlock {
     // SAFETY: FDCAN1's registers exist for the whole run, all accesses to them
     // are volatile, and who may write which is divided below: `Tx` owns the
-    // TX* registers, `Rx` all others. Each of them exists once, made by `setup`,
+    // TX* registers and CCCR, `Rx` all others. Each of them exists once, made by `setup`,
     // which consumed the peripheral.
     unsafe { &*pac::FDCAN1::ptr() }
 }
@@ -143,6 +143,19 @@ impl Tx {
         registers()
             .txbcr()
             .write(|w| unsafe { w.bits((1 << DEPTH) - 1) });
+    }
+
+    /// Lets the controller take part in the traffic again after bus-off, as soon
+    /// as the bus was idle 129 times (ISO 11898-1). Nothing that waited to be sent
+    /// before is left.
+    pub fn restart(&mut self) {
+        let control = registers().cccr();
+        // Bus-off has set INIT; setting CCE forgets all requests.
+        control.modify(|_, w| w.init().set_bit());
+        while control.read().init().bit_is_clear() {}
+        control.modify(|_, w| w.cce().set_bit());
+        control.modify(|_, w| w.cce().clear_bit());
+        control.modify(|_, w| w.init().clear_bit());
     }
 }
 

@@ -10,8 +10,7 @@ use super::state::{
 };
 use super::{ATTEMPT, NodeBoot, deadline};
 use crate::frame::Frame;
-use crate::id::{CobId, FunctionCode};
-use crate::nmt::{self, Command};
+use crate::nmt::{self, Command, ErrorControl, Guard, Guardian};
 use crate::time::{Duration, Instant};
 
 /// Heartbeats of a node that may be missed before its first one is given up.
@@ -19,15 +18,21 @@ const HEARTBEATS_AWAITED: u32 = 3;
 /// The time that a node is given to report operational, however short its
 /// heartbeat.
 const START_TIME: Duration = Duration::from_millis(100);
-/// The request for error control by a remote frame: one byte is to come.
-const GUARDING_DLC: u8 = 1;
 
 impl NodeBoot {
     /// The node reported its NMT state: a boot-up frame, a heartbeat or the
     /// answer to node guarding (CiA 301, 7.2.8.3.2).
-    pub(in super::super) fn on_error_control(&mut self, state: nmt::State, now: Instant) {
+    pub(in super::super) fn on_error_control(&mut self, frame: &Frame, now: Instant) {
+        let Some(ErrorControl { state, .. }) = ErrorControl::decode(frame) else {
+            return;
+        };
+        let counts = self.guardian.on_frame(frame, now).is_some();
         if state == nmt::State::Initialising {
             return self.on_boot_up(now);
+        }
+        // Of a node that was not reset nobody knows the toggle bit.
+        if self.is_asked() && !counts && !matches!(self.state, State::AwaitState(_)) {
+            return;
         }
         let operational = state == nmt::State::Operational;
         match self.state {
@@ -41,7 +46,9 @@ impl NodeBoot {
             State::AwaitState(_) => self.reset(false, now),
             State::AwaitErrorControl(_) => self.ready(),
             State::Ready(_) | State::Starting(_) if operational && !self.held => self.operational(),
-            State::Operational(_) if !operational => self.lose(false),
+            State::Operational(_) if !operational => {
+                self.lose(false);
+            }
             State::GivenUp(_) => self.on_sign_of_life(now),
             _ => {}
         }
@@ -50,9 +57,11 @@ impl NodeBoot {
     /// It booted, or booted again in the middle of everything: whatever was
     /// done is gone, so all starts over.
     fn on_boot_up(&mut self, now: Instant) {
+        if self.lose(true) {
+            return;
+        }
         match self.state {
             State::Idle(_) | State::Lost(_) => return,
-            _ if self.is_up() => return self.lose(true),
             State::GivenUp(_) => self.restarts = 0,
             State::AwaitBootUp(_) | State::AwaitReset(_) => {}
             _ if !self.fresh || !self.is(Assignment::MAY_START) => {}
@@ -117,14 +126,15 @@ impl NodeBoot {
     }
 
     /// It was booted and is not any more. The network decides what follows.
-    pub(in super::super) fn lose(&mut self, booted: bool) {
+    pub(in super::super) fn lose(&mut self, booted: bool) -> bool {
         if !self.is_up() {
-            return;
+            return false;
         }
         self.lost = true;
         self.result = BootResult::Pending;
         self.state = State::Lost(Lost { booted });
         self.report(Event::NodeLost(self.node.id));
+        true
     }
 
     /// A lost node is booted again (CiA 302-2, "Error handler").
@@ -186,7 +196,7 @@ impl NodeBoot {
         if self.patience() == Duration::ZERO {
             return self.reset(false, now);
         }
-        self.guard = now;
+        self.guard(now);
         self.state = State::AwaitState(AwaitState {
             deadline: now + self.patience(),
         });
@@ -197,7 +207,7 @@ impl NodeBoot {
         if self.patience() == Duration::ZERO {
             return self.ready();
         }
-        self.guard = now;
+        self.guard(now);
         self.state = State::AwaitErrorControl(AwaitErrorControl {
             deadline: now + self.patience(),
         });
@@ -242,12 +252,13 @@ impl NodeBoot {
         if alone {
             self.send(Command::Start);
         }
-        self.guard = now;
         if self.patience() == Duration::ZERO {
             return self.operational();
         }
+        // A guarded node is asked when its time comes, not at once.
+        let asked = self.settings.assignment.guard_time();
         self.state = State::Starting(Starting {
-            deadline: now + self.patience().max(START_TIME),
+            deadline: now + self.patience().max(START_TIME) + asked,
         });
     }
 
@@ -262,20 +273,34 @@ impl NodeBoot {
         }
     }
 
-    pub(super) fn guards(&self) -> bool {
-        self.state.awaits_error_control()
-            && self.node.heartbeat_ms == 0
-            && self.settings.assignment.guard_time() != Duration::ZERO
+    /// Whether it tells its state by answers only.
+    fn is_asked(&self) -> bool {
+        self.node.heartbeat_ms == 0 && self.patience() != Duration::ZERO
     }
 
-    /// Node guarding: a remote frame every guard time (CiA 301, 7.2.8.3.2.1).
+    /// Begins node guarding (CiA 301, 7.2.8.3.2.1), if the node has no heartbeat.
+    pub(super) fn guard(&mut self, now: Instant) {
+        let time = match self.is_asked() {
+            true => self.settings.assignment.guard_time(),
+            false => Duration::ZERO,
+        };
+        let retries = self.settings.assignment.guard_retries();
+        self.guardian = Guardian::new(self.node.id, time, retries);
+        self.guardian.start(now);
+    }
+
+    /// Asks a guarded node for its state when it is time, and loses it when it
+    /// does not answer.
     pub(super) fn ask_for_state(&mut self, now: Instant) {
-        if self.guards() && now >= self.guard {
-            self.guard = now + self.settings.assignment.guard_time();
-            let id = CobId::of(FunctionCode::ErrorControl, self.node.id);
-            if let Some(frame) = Frame::remote_frame(id, GUARDING_DLC) {
-                self.push(Action::Send(frame));
+        if !self.state.is_guarded() {
+            return;
+        }
+        match self.guardian.poll(now) {
+            Some(Guard::Ask(frame)) => self.push(Action::Send(frame)),
+            Some(Guard::Lost(_)) => {
+                self.lose(false);
             }
+            None => {}
         }
     }
 }

@@ -8,7 +8,7 @@ use super::event::{Action, Event};
 use super::failure::{BootResult, Cause, Failure, Status};
 use super::settings::{Assignment, NodeSettings};
 use crate::network::{self, Network, Node};
-use crate::nmt::{Command, NodeControl};
+use crate::nmt::{Command, Guardian, NodeControl};
 use crate::objects;
 use crate::sdo::Client;
 use crate::time::{Duration, Instant};
@@ -32,8 +32,8 @@ pub(super) struct NodeBoot {
     state: State,
     /// End of the boot time 1F89h; `None`: for ever.
     boot_deadline: Option<Instant>,
-    /// When the node is asked for its state next, if it is guarded.
-    guard: Instant,
+    /// Asks the node for its state, if it has no heartbeat.
+    guardian: Guardian,
     /// Tries of the request under way.
     tries: u8,
     /// Restarts in the middle of the boot-up.
@@ -67,7 +67,7 @@ impl NodeBoot {
             client: Client::new(node.id, node.sdo_timeout),
             state: State::Idle(Idle),
             boot_deadline: None,
-            guard: Instant::ZERO,
+            guardian: Guardian::new(node.id, Duration::ZERO, 0),
             tries: 0,
             restarts: 0,
             planned: u16::try_from(network::plan(network, node).count()).unwrap_or(u16::MAX),
@@ -132,6 +132,10 @@ impl NodeBoot {
         }
     }
 
+    pub(super) const fn is_operational(&self) -> bool {
+        matches!(self.state, State::Operational(_))
+    }
+
     pub(super) const fn is_lost(&self) -> bool {
         matches!(self.state, State::Lost(_))
     }
@@ -188,7 +192,7 @@ impl NodeBoot {
         }
         self.await_boot_up(boot_time, now);
         if !self.is(Assignment::MAY_START) {
-            self.guard = now;
+            self.guard(now);
             let until = self.boot_deadline.unwrap_or(now + ATTEMPT);
             self.state = State::AwaitErrorControl(AwaitErrorControl {
                 deadline: until + self.patience(),
@@ -220,7 +224,10 @@ impl NodeBoot {
 
     /// When [`poll`](Self::poll) has to be called again at the latest.
     pub(super) fn next_deadline(&self) -> Option<Instant> {
-        let guard = self.guards().then_some(self.guard);
+        let guard = match self.state.is_guarded() {
+            true => self.guardian.next_deadline(),
+            false => None,
+        };
         [self.state.deadline(), self.client.next_deadline(), guard]
             .into_iter()
             .flatten()

@@ -141,11 +141,15 @@ impl State {
         }
     }
 
-    /// Whether an answer to node guarding would lead on.
-    pub(super) const fn awaits_error_control(&self) -> bool {
+    /// Whether a node without heartbeat is asked for its state.
+    pub(super) const fn is_guarded(&self) -> bool {
         matches!(
             self,
-            State::AwaitState(_) | State::AwaitErrorControl(_) | State::Starting(_)
+            State::AwaitState(_)
+                | State::AwaitErrorControl(_)
+                | State::Ready(_)
+                | State::Starting(_)
+                | State::Operational(_)
         )
     }
 }

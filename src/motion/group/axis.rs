@@ -24,6 +24,8 @@ pub(super) struct Axis {
     reported: Option<State>,
     /// Consecutive cycles without TPDO.
     pub(super) missing: u8,
+    /// Left out: nothing is asked of it.
+    pub(super) absent: bool,
     /// A fault of this axis has been reported.
     pub(super) faulted: bool,
     /// The drive itself has taken the axis out of the master's hands.
@@ -56,6 +58,7 @@ impl Axis {
             status: None,
             reported: None,
             missing: 0,
+            absent: false,
             faulted: false,
             excluded: false,
             coasting: false,
@@ -70,7 +73,8 @@ impl Axis {
     }
 
     /// Forgets what was heard and what went wrong, before enabling.
-    pub(super) fn restart(&mut self) {
+    pub(super) fn restart(&mut self, absent: bool) {
+        self.absent = absent;
         self.status = None;
         self.missing = 0;
         self.faulted = false;
@@ -157,9 +161,9 @@ impl Axis {
     pub(super) fn begin_fault_stop(&mut self, were_enabled: bool) {
         self.ramp_from = self.velocity;
         self.settled = 0;
-        if !self.state().is_some_and(State::is_enabled) {
+        if self.absent || !self.state().is_some_and(State::is_enabled) {
             self.excluded = true;
-            self.coasting = !were_enabled;
+            self.coasting = self.absent || !were_enabled;
         }
     }
 

@@ -12,7 +12,8 @@
 //!    obey ramp down so that they come to rest together; an axis disabled by
 //!    its own drive is left out.
 //! 3. Recovery leads to standby, never to motion: a faulted group waits until
-//!    the network has gone down and come up again.
+//!    the network has gone down and come up again, or until the axis at fault is
+//!    left out.
 //! 4. What cannot be carried out is refused with a reason, and nothing is sent.
 
 mod axis;
@@ -84,6 +85,9 @@ pub struct Request {
     pub stop: bool,
     /// Edge: a fault seen elsewhere, with the axis counted from 0.
     pub fault: Option<(usize, FaultCause)>,
+    /// Level: bit n leaves out axis n, whose optional node is not there. One that
+    /// goes in motion is a fault; one that comes waits for standby.
+    pub absent: u32,
 }
 
 /// `N` axes moved in step; see the module.
@@ -101,8 +105,11 @@ pub struct Group<const N: usize> {
     step: usize,
     /// Cycles of the ramp after a fault.
     fault_ramp: u32,
-    /// The network has gone down since the group stood still after a fault.
+    /// Since the fault, the network has gone down, or an axis at fault is left
+    /// out.
     network_was_down: bool,
+    /// The axes left out since the group began to enable.
+    absent: u32,
     program: Result<(), PlanError>,
     events: Deque<GroupEvent, EVENTS>,
     lost: u16,
@@ -145,6 +152,7 @@ impl<const N: usize> Group<N> {
             step: 0,
             fault_ramp: 0,
             network_was_down: false,
+            absent: 0,
             program: config.program.duration(config).map(|_| ()),
             events: Deque::new(),
             lost: 0,
@@ -182,6 +190,7 @@ impl<const N: usize> Group<N> {
         self.advance(feedback);
         for ((axis, feedback), out) in self.axes.iter_mut().zip(feedback).zip(out) {
             *out = match self.state {
+                _ if axis.absent => axis.command_off(),
                 GroupState::Idle | GroupState::Faulted => axis.command_off(),
                 GroupState::Enabling | GroupState::Standby => axis.command_rest(self.now, feedback),
                 GroupState::Moving | GroupState::Stopping => {
@@ -221,12 +230,21 @@ impl<const N: usize> Group<N> {
 
     /// Requests: network up, release, stop.
     fn obey(&mut self, request: &Request, feedback: &[AxisFeedback; N]) {
-        match self.state {
-            GroupState::Idle if request.network_ready => self.begin_enabling(),
-            GroupState::Faulted if !request.network_ready => self.network_was_down = true,
-            GroupState::Faulted if self.network_was_down => self.begin_enabling(),
-            GroupState::Moving if request.stop => self.begin_stopping(),
-            _ => {}
+        let ready = request.network_ready;
+        let left_out = |(n, axis): (usize, &Axis)| axis.faulted && is_in(request.absent, n);
+        self.network_was_down |= !ready || self.axes.iter().enumerate().any(left_out);
+        let enable = match self.state {
+            GroupState::Idle => ready,
+            GroupState::Faulted => ready && self.network_was_down,
+            GroupState::Standby => request.absent != self.absent,
+            GroupState::Moving if request.stop => {
+                self.begin_stopping();
+                false
+            }
+            _ => false,
+        };
+        if enable {
+            self.begin_enabling(request.absent);
         }
         if request.release
             && let Err(refusal) = self.release(request.stop, feedback)
@@ -235,10 +253,11 @@ impl<const N: usize> Group<N> {
         }
     }
 
-    fn begin_enabling(&mut self) {
+    fn begin_enabling(&mut self, absent: u32) {
         self.enter(GroupState::Enabling);
-        for axis in &mut self.axes {
-            axis.restart();
+        self.absent = absent;
+        for (n, axis) in self.axes.iter_mut().enumerate() {
+            axis.restart(is_in(absent, n));
         }
         self.set_stage(Goal::Disabled);
     }
@@ -258,6 +277,9 @@ impl<const N: usize> Group<N> {
             return Err(Refusal::StopRequested);
         }
         for (axis, feedback) in (0u8..).zip(feedback) {
+            if is_in(self.absent, usize::from(axis)) {
+                continue;
+            }
             if !feedback.fresh {
                 return Err(Refusal::NotFresh { axis });
             }
@@ -359,7 +381,7 @@ impl<const N: usize> Group<N> {
 
     /// All axes reach a state before the next transition is commanded.
     fn advance_enabling(&mut self, feedback: &[AxisFeedback; N]) {
-        if !self.axes.iter().all(|a| a.machine.reached()) {
+        if !self.axes.iter().all(|a| a.absent || a.machine.reached()) {
             return;
         }
         match self.stage {
@@ -367,7 +389,11 @@ impl<const N: usize> Group<N> {
             Goal::Ready => self.set_stage(Goal::SwitchedOn),
             Goal::SwitchedOn => self.set_stage(Goal::Enabled),
             Goal::Enabled | Goal::QuickStop => {
-                if feedback.iter().all(|f| f.fresh) {
+                if feedback
+                    .iter()
+                    .zip(&self.axes)
+                    .all(|(f, a)| a.absent || f.fresh)
+                {
                     self.hold_actual(feedback);
                     for (axis, feedback) in self.axes.iter_mut().zip(feedback) {
                         axis.home = feedback.position;
@@ -410,7 +436,7 @@ impl<const N: usize> Group<N> {
             let (Some(axis), Some(feedback)) = (self.axes.get_mut(n), feedback.get(n)) else {
                 continue;
             };
-            if axis.arrived {
+            if axis.arrived || axis.absent {
                 continue;
             }
             all = false;
@@ -442,7 +468,7 @@ impl<const N: usize> Group<N> {
             let (Some(axis), Some(feedback)) = (self.axes.get_mut(n), feedback.get(n)) else {
                 continue;
             };
-            let rests = axis.ended(t, 0) && axis.settle(feedback, None, group);
+            let rests = axis.absent || (axis.ended(t, 0) && axis.settle(feedback, None, group));
             all &= rests;
             if !rests && axis.ended(t, patience) {
                 let error = axis.error(t, feedback.position);
@@ -455,4 +481,9 @@ impl<const N: usize> Group<N> {
             self.enter(GroupState::Standby);
         }
     }
+}
+
+/// Whether a set of axes holds axis `n`.
+fn is_in(axes: u32, n: usize) -> bool {
+    axes.checked_shr(n as u32).is_some_and(|bits| bits & 1 != 0)
 }

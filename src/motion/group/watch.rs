@@ -1,6 +1,6 @@
 //! Supervision: what stops the group, and the stop after a fault.
 
-use super::{AxisFeedback, FaultCause, Group, GroupEvent, GroupState, Request};
+use super::{AxisFeedback, FaultCause, Group, GroupEvent, GroupState, Request, is_in};
 use crate::cia402::{Goal, StatusWord};
 
 impl<const N: usize> Group<N> {
@@ -17,7 +17,7 @@ impl<const N: usize> Group<N> {
             _ => {}
         }
         for n in 0..N {
-            if let Some(cause) = self.find_fault(n, state, feedback) {
+            if let Some(cause) = self.find_fault(n, state, request, feedback) {
                 self.fault(Some(n), cause);
             }
         }
@@ -32,9 +32,16 @@ impl<const N: usize> Group<N> {
         &self,
         n: usize,
         state: GroupState,
+        request: &Request,
         feedback: &[AxisFeedback; N],
     ) -> Option<FaultCause> {
         let (axis, feedback) = (self.axes.get(n)?, feedback.get(n)?);
+        if axis.absent {
+            return None;
+        }
+        if request.network_ready && is_in(request.absent, n) && !axis.faulted {
+            return Some(FaultCause::LeftOperational);
+        }
         if axis.missing >= self.config.missing_tpdo_max && !axis.faulted {
             return Some(FaultCause::TpdoMissing {
                 cycles: axis.missing,
@@ -133,8 +140,8 @@ impl<const N: usize> Group<N> {
             };
             let silent = axis.missing >= group.missing_tpdo_max;
             let rests = axis.settle(feedback, None, group);
-            all &= rests || silent;
-            if late && !rests {
+            all &= rests || silent || axis.absent;
+            if late && !rests && !axis.absent {
                 let velocity = feedback.velocity;
                 self.report(GroupEvent::NotAtRest {
                     axis: n as u8,

@@ -1,0 +1,397 @@
+//! Nodes that are lost and come back, bus-off, and the start by request
+//! (CiA 302-2), with the firmware image: to standby, never to motion.
+
+mod common;
+
+use canmaster::{NodeId, nmt};
+use canmaster_sim::bus::{BusFault, RecordKind};
+use canmaster_sim::drive::DriveFault;
+use canmaster_sim::frame::{WireFrame, WireId};
+use canmaster_sim::judge::STANDSTILL_RPM;
+use canmaster_sim::time::Time;
+use canmaster_sim::world::trials::moving;
+use canmaster_sim::world::{Scenario, Stimulus, World, enabled, operational};
+
+use common::image;
+
+const NODE: NodeId = NodeId::constant::<4>();
+const AXIS: usize = 3;
+const MASTER: u16 = 127;
+const NMT: u16 = 0x000;
+const SYNC: u16 = 0x080;
+/// All sub-indexes of 1F82h at once.
+const ALL: u8 = 0x80;
+const NMT_STARTUP: u16 = 0x1F80;
+const SLAVE_ASSIGNMENT: u16 = 0x1F81;
+const REQUEST_NMT: u16 = 0x1F82;
+/// Values of 1F82h.
+const START: u8 = 5;
+const RESET_COMMUNICATION: u8 = 7;
+/// 1F81h: listed and may be started; without bit 3 it is optional.
+const OPTIONAL: u32 = 0b101;
+const MANDATORY: u32 = 0b1101;
+const KEEP_ALIVE: u32 = 1 << 4;
+/// 1F80h: this device is the master; start all at once.
+const IS_MASTER: u32 = 1;
+const START_ALL: u32 = 1 << 1;
+const NOT_BY_ITSELF: u32 = 1 << 2;
+const NO_START: u32 = 1 << 3;
+
+const READY_BY: Time = Time::from_ms(5000);
+/// From a lost node to standby: its boot and its configuration, or the silence
+/// after bus-off with a boot of all.
+const BACK_BY: Time = Time::from_ms(3500);
+/// How long nothing must move in standby.
+const WATCHED: Time = Time::from_ms(300);
+
+fn standby(seed: u64) -> World<'static> {
+    let scenario = Scenario::new(seed, Time::MAX).unattended();
+    let mut world = World::new(image(), scenario).unwrap().with_guest();
+    assert!(world.run_to(READY_BY, World::ready), "{}", last(&world));
+    world
+}
+
+fn last(world: &World<'_>) -> String {
+    let log = world.log().iter();
+    let lines: Vec<String> = log.map(|(_, line)| line.to_string()).collect();
+    lines.join("\n")
+}
+
+fn logged(world: &World<'_>, words: &str) -> bool {
+    let mut log = world.log().iter();
+    log.any(|(_, line)| line.to_string().contains(words))
+}
+
+#[track_caller]
+fn assert_logged(world: &World<'_>, words: &str) {
+    assert!(logged(world, words), "`{words}` in:\n{}", last(world));
+}
+
+#[track_caller]
+fn comes_to(world: &mut World<'_>, within: Time, what: impl Fn(&World<'_>) -> bool) {
+    let limit = world.now() + within;
+    let came = world.run_to(limit, what);
+    assert!(came, "at {}:\n{}", world.now(), last(world));
+}
+
+fn others(world: &World<'_>, test: fn(&canmaster_sim::drive::DriveStatus) -> bool) -> bool {
+    let others = world.statuses().flatten();
+    others
+        .filter(|status| status.node != NODE)
+        .all(|status| test(&status))
+}
+
+fn standing(world: &World<'_>) -> bool {
+    let mut truths = world.truths().flatten();
+    truths.all(|truth| truth.velocity_rpm.abs() <= STANDSTILL_RPM)
+}
+
+/// Standby again, nothing moves by itself, and the next release moves.
+#[track_caller]
+fn comes_back_and_waits(world: &mut World<'_>) {
+    comes_to(world, Time::from_ms(500), |world| !world.ready());
+    comes_to(world, BACK_BY, |world| world.ready());
+    let until = world.now() + WATCHED;
+    while world.now() < until {
+        world.run_until(world.now() + Time::from_ms(5));
+        assert!(standing(world), "moved without a release:\n{}", last(world));
+    }
+    world.press();
+    comes_to(world, Time::from_ms(1000), |world| world.in_full_motion());
+}
+
+fn power_cycle(world: &mut World<'_>, pause_ms: u64) {
+    let off = world.now();
+    let on = off + Time::from_ms(pause_ms);
+    let fault = DriveFault::PowerCycle { off, on };
+    world.apply(Stimulus::Drive { node: NODE, fault });
+}
+
+/// The board sees a wrong bit in each of its next frames with this identifier, as
+/// often as it takes for bus-off: 32 errors of 8 counts each.
+fn spoil(world: &mut World<'_>, identifier: u16) {
+    const ERRORS: usize = 32;
+    /// Beyond the arbitration.
+    const BIT: u32 = 25;
+    let seen_by = Some(world.board_port());
+    for _ in 0..ERRORS {
+        let id = WireId::Standard(identifier);
+        let bit = BIT;
+        world.apply(Stimulus::Bus(BusFault::FlipBit { id, bit, seen_by }));
+    }
+}
+
+/// An expedited download by the guest; the abort code if it was refused.
+fn write(world: &mut World<'_>, node: u16, at: (u16, u8), bytes: &[u8]) -> Result<(), u32> {
+    while world.hear().is_some() {}
+    let [low, high] = at.0.to_le_bytes();
+    let unused = 4 - bytes.len() as u8;
+    let mut data = [0x23 | unused << 2, low, high, at.1, 0, 0, 0, 0];
+    data[4..4 + bytes.len()].copy_from_slice(bytes);
+    assert!(world.say(WireFrame::standard(0x600 + node, &data)));
+    let limit = world.now() + Time::from_ms(500);
+    while world.now() < limit {
+        world.run_until(world.now() + Time::from_us(500));
+        while let Some(frame) = world.hear() {
+            if frame.id == WireId::Standard(0x580 + node) {
+                let [command, .., a, b, c, d] = frame.data;
+                return match command {
+                    0x60 => Ok(()),
+                    _ => Err(u32::from_le_bytes([a, b, c, d])),
+                };
+            }
+        }
+    }
+    panic!("node {node} does not answer");
+}
+
+fn startup(world: &mut World<'_>, bits: u32) {
+    let bytes = bits.to_le_bytes();
+    write(world, MASTER, (NMT_STARTUP, 0), &bytes).unwrap();
+}
+
+fn assign(world: &mut World<'_>, bits: u32) {
+    let bytes = bits.to_le_bytes();
+    let at = (SLAVE_ASSIGNMENT, NODE.get());
+    write(world, MASTER, at, &bytes).unwrap();
+}
+
+fn request(world: &mut World<'_>, node: u8, state: u8) {
+    write(world, MASTER, (REQUEST_NMT, node), &[state]).unwrap();
+}
+
+/// The frames with this identifier that were on the wire since `from`.
+fn sent(world: &World<'_>, identifier: u16, from: Time) -> Vec<(Time, WireFrame)> {
+    let mut frames = Vec::new();
+    for record in world.wire().iter().filter(|record| record.sof >= from) {
+        if let RecordKind::Frame(frame) = &record.kind
+            && frame.id == WireId::Standard(identifier)
+        {
+            frames.push((record.sof, *frame));
+        }
+    }
+    frames
+}
+
+#[test]
+fn a_drive_that_power_cycles_in_standby_is_booted_again_while_the_rest_runs_on() {
+    let mut world = standby(51);
+    let from = world.now();
+    power_cycle(&mut world, 50);
+    let until = from + Time::from_ms(400);
+    while world.now() < until {
+        world.run_until(world.now() + Time::from_ms(10));
+        assert!(others(&world, operational), "{}", last(&world));
+    }
+    comes_back_and_waits(&mut world);
+    assert_logged(&world, "node 4: is back");
+    // Nobody else was spoken to.
+    let commands = sent(&world, NMT, from);
+    assert!(
+        commands
+            .iter()
+            .all(|(_, frame)| frame.data[1] == NODE.get())
+    );
+}
+
+#[test]
+fn a_drive_that_power_cycles_in_motion_stops_all_and_they_come_back_to_standby() {
+    let mut world = moving(image(), 52).unwrap();
+    power_cycle(&mut world, 20);
+    comes_to(&mut world, Time::from_ms(1000), |world| {
+        others_stand(world) && others(world, operational)
+    });
+    comes_back_and_waits(&mut world);
+}
+
+fn others_stand(world: &World<'_>) -> bool {
+    let truths = world.truths().enumerate();
+    let mut others = truths.filter(|(axis, _)| *axis != AXIS);
+    others.all(|(_, truth)| truth.unwrap().velocity_rpm.abs() <= STANDSTILL_RPM)
+}
+
+#[test]
+fn a_drive_whose_process_data_stay_away_is_booted_again() {
+    let mut world = moving(image(), 53).unwrap();
+    let at = world.now();
+    let fault = DriveFault::TpdosLost { at };
+    world.apply(Stimulus::Drive { node: NODE, fault });
+    comes_to(&mut world, Time::from_ms(1500), |world| {
+        standing(world) && logged(world, "node 4: lost, to be booted again")
+    });
+    assert_logged(&world, "no TPDO in 3 cycles");
+    assert!(others(&world, operational));
+}
+
+#[test]
+fn a_lost_optional_drive_is_left_out_until_it_is_back() {
+    let mut world = standby(54);
+    assign(&mut world, OPTIONAL);
+    world.press();
+    comes_to(&mut world, Time::from_ms(1000), |world| {
+        world.in_full_motion()
+    });
+    power_cycle(&mut world, 6000);
+    // In motion its loss stops all; then the others are enabled without it.
+    comes_to(&mut world, Time::from_ms(1000), standing);
+    comes_to(&mut world, BACK_BY, |world| others(world, enabled));
+    world.run_until(world.now() + WATCHED);
+    assert!(standing(&world), "{}", last(&world));
+    world.press();
+    comes_to(&mut world, Time::from_ms(1000), |world| {
+        let mut truths = world.truths().flatten().enumerate();
+        truths.all(|(axis, truth)| (axis == AXIS) == (truth.velocity_rpm.abs() <= STANDSTILL_RPM))
+    });
+    // Back it is taken in at the next standby.
+    comes_to(&mut world, Time::from_ms(9000), |world| {
+        world.statuses().flatten().all(|status| enabled(&status))
+    });
+    assert!(standing(&world));
+    assert_logged(&world, "program done");
+}
+
+#[test]
+fn a_missing_optional_drive_holds_nobody_up() {
+    let mut world = standby(55);
+    assign(&mut world, OPTIONAL);
+    let off = world.now();
+    let fault = DriveFault::PowerLoss { at: off };
+    world.apply(Stimulus::Drive { node: NODE, fault });
+    request(&mut world, ALL, RESET_COMMUNICATION);
+    comes_to(&mut world, Time::from_ms(1000), |world| {
+        others(world, |status| status.nmt == nmt::State::PreOperational)
+    });
+    // Its boot time is 1.5 s.
+    comes_to(&mut world, BACK_BY, |world| others(world, enabled));
+    assert_logged(&world, "node 4: no boot-up frame");
+    assert_logged(&world, "network ready");
+}
+
+#[test]
+fn after_bus_off_the_master_is_silent_and_boots_the_nodes_to_standby() {
+    let mut world = standby(56);
+    spoil(&mut world, SYNC);
+    comes_to(&mut world, Time::from_ms(200), |world| {
+        logged(world, "bus-off: restarting the controller")
+    });
+    let off = world.now();
+    comes_back_and_waits(&mut world);
+    assert_logged(&world, "controller restarted");
+    let reset = sent(&world, NMT, off)[0].0;
+    // A pause of 100 ms and a silence of 600 ms.
+    assert!(reset >= off + Time::from_ms(690), "{reset}");
+    for identifier in [SYNC, 0x700 + MASTER, 0x201, 0x206] {
+        let sent = sent(&world, identifier, off);
+        let first = sent[0].0;
+        assert!(first > reset, "{identifier:03X}h at {first}");
+    }
+    assert_eq!(world.board().diagnostics().len(), 0);
+}
+
+#[test]
+fn bus_off_in_motion_ends_in_standby() {
+    let mut world = moving(image(), 57).unwrap();
+    spoil(&mut world, SYNC);
+    comes_to(&mut world, Time::from_ms(1000), standing);
+    comes_back_and_waits(&mut world);
+}
+
+#[test]
+fn while_the_bus_stays_bad_the_pauses_grow() {
+    let mut world = standby(58);
+    spoil(&mut world, SYNC);
+    // And twice when it speaks again.
+    spoil(&mut world, NMT);
+    spoil(&mut world, NMT);
+    comes_to(&mut world, Time::from_ms(4500), |world| {
+        logged(world, "restarting the controller in 400 ms")
+    });
+    assert_logged(&world, "restarting the controller in 100 ms");
+    assert_logged(&world, "restarting the controller in 200 ms");
+    comes_back_and_waits(&mut world);
+}
+
+#[test]
+fn the_start_waits_for_a_request_if_1f80h_says_so() {
+    let mut world = standby(59);
+    startup(&mut world, IS_MASTER | START_ALL | NOT_BY_ITSELF);
+    request(&mut world, ALL, RESET_COMMUNICATION);
+    comes_to(&mut world, BACK_BY, |world| {
+        logged(world, "the start has to be requested")
+    });
+    world.run_until(world.now() + WATCHED);
+    let mut statuses = world.statuses().flatten();
+    assert!(statuses.all(|status| status.nmt == nmt::State::PreOperational));
+    drop(statuses);
+    let from = world.now();
+    request(&mut world, MASTER as u8, START);
+    comes_back_and_waits(&mut world);
+    let start = sent(&world, NMT, from);
+    assert_eq!(start[0].1.data[..2], [0x01, 0]);
+}
+
+#[test]
+fn nodes_that_the_master_does_not_start_are_started_by_request_one_by_one() {
+    let mut world = standby(60);
+    startup(&mut world, IS_MASTER | NO_START);
+    request(&mut world, ALL, RESET_COMMUNICATION);
+    comes_to(&mut world, BACK_BY, |world| {
+        logged(world, "the nodes are to be started by request")
+    });
+    let from = world.now();
+    for node in 1..=6 {
+        request(&mut world, node, START);
+    }
+    comes_back_and_waits(&mut world);
+    let started = sent(&world, NMT, from);
+    let started: Vec<[u8; 2]> = started
+        .iter()
+        .map(|(_, frame)| [frame.data[0], frame.data[1]])
+        .collect();
+    assert_eq!(started, [[1, 1], [1, 2], [1, 3], [1, 4], [1, 5], [1, 6]]);
+}
+
+#[test]
+fn without_bit_1_of_1f80h_nodes_are_started_one_by_one() {
+    let mut world = standby(61);
+    startup(&mut world, IS_MASTER);
+    let from = world.now();
+    request(&mut world, ALL, RESET_COMMUNICATION);
+    comes_to(&mut world, BACK_BY, |world| world.ready());
+    let commands = sent(&world, NMT, from);
+    let starts = commands.iter().filter(|(_, frame)| frame.data[0] == 1);
+    let starts: Vec<u8> = starts.map(|(_, frame)| frame.data[1]).collect();
+    assert_eq!(starts, [1, 2, 3, 4, 5, 6]);
+}
+
+#[test]
+fn a_drive_to_be_kept_alive_is_not_reset_with_the_others() {
+    let mut world = standby(62);
+    assign(&mut world, MANDATORY | KEEP_ALIVE);
+    // It does not watch the master (1016h): an EPOS4 that misses it can only go on
+    // after a reset of its communication.
+    write(&mut world, u16::from(NODE.get()), (0x1016, 1), &[0; 4]).unwrap();
+    let from = world.now();
+    spoil(&mut world, SYNC);
+    comes_to(&mut world, BACK_BY, |world| {
+        logged(world, "node 4: was operational already and is left running")
+    });
+    comes_back_and_waits(&mut world);
+    // Neither a reset of all nor one of this node, and no boot-up message of it.
+    let commands = sent(&world, NMT, from);
+    let resets = commands.iter().filter(|(_, frame)| frame.data[0] == 0x82);
+    let resets: Vec<u8> = resets.map(|(_, frame)| frame.data[1]).collect();
+    assert_eq!(resets, [1, 2, 3, 5, 6]);
+    let own = sent(&world, 0x700 + u16::from(NODE.get()), from);
+    assert!(own.iter().all(|(_, frame)| frame.data[0] != 0));
+}
+
+#[test]
+fn a_drive_that_is_reset_by_request_comes_back_alone() {
+    let mut world = standby(63);
+    request(&mut world, NODE.get(), RESET_COMMUNICATION);
+    comes_to(&mut world, Time::from_ms(200), |world| {
+        !world.ready() && logged(world, "node 4: lost, to be booted again")
+    });
+    comes_back_and_waits(&mut world);
+}
