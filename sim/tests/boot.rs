@@ -3,6 +3,8 @@
 
 mod common;
 
+use canmaster::id::Address;
+use canmaster::sdo::Protocol;
 use canmaster::{NodeId, nmt};
 use canmaster_sim::bus::{BusFault, RecordKind};
 use canmaster_sim::drive::DriveFault;
@@ -10,17 +12,15 @@ use canmaster_sim::frame::{WireFrame, WireId};
 use canmaster_sim::judge::STANDSTILL_RPM;
 use canmaster_sim::time::Time;
 use canmaster_sim::world::trials::moving;
-use canmaster_sim::world::{Scenario, Stimulus, World, enabled, operational};
+use canmaster_sim::world::{Client, Scenario, Stimulus, World, enabled, operational};
 
 use common::image;
 
 const NODE: NodeId = NodeId::constant::<4>();
 const AXIS: usize = 3;
-const MASTER: u16 = 127;
+const MASTER: NodeId = NodeId::constant::<127>();
 const NMT: u16 = 0x000;
 const SYNC: u16 = 0x080;
-/// All sub-indexes of 1F82h at once.
-const ALL: u8 = 0x80;
 const NMT_STARTUP: u16 = 0x1F80;
 const SLAVE_ASSIGNMENT: u16 = 0x1F81;
 const REQUEST_NMT: u16 = 0x1F82;
@@ -46,7 +46,7 @@ const WATCHED: Time = Time::from_ms(300);
 
 fn standby(seed: u64) -> World<'static> {
     let scenario = Scenario::new(seed, Time::MAX).unattended();
-    let mut world = World::new(image(), scenario).unwrap().with_guest();
+    let mut world = World::new(image(), scenario).unwrap();
     assert!(world.run_to(READY_BY, World::ready), "{}", last(&world));
     world
 }
@@ -121,43 +121,33 @@ fn spoil(world: &mut World<'_>, identifier: u16) {
     }
 }
 
-/// An expedited download by the guest; the abort code if it was refused.
-fn write(world: &mut World<'_>, node: u16, at: (u16, u8), bytes: &[u8]) -> Result<(), u32> {
-    while world.hear().is_some() {}
-    let [low, high] = at.0.to_le_bytes();
-    let unused = 4 - bytes.len() as u8;
-    let mut data = [0x23 | unused << 2, low, high, at.1, 0, 0, 0, 0];
-    data[4..4 + bytes.len()].copy_from_slice(bytes);
-    assert!(world.say(WireFrame::standard(0x600 + node, &data)));
-    let limit = world.now() + Time::from_ms(500);
-    while world.now() < limit {
-        world.run_until(world.now() + Time::from_us(500));
-        while let Some(frame) = world.hear() {
-            if frame.id == WireId::Standard(0x580 + node) {
-                let [command, .., a, b, c, d] = frame.data;
-                return match command {
-                    0x60 => Ok(()),
-                    _ => Err(u32::from_le_bytes([a, b, c, d])),
-                };
-            }
-        }
-    }
-    panic!("node {node} does not answer");
+/// A client of the board, which is in pre-operational and awaits the boot-up
+/// frames.
+fn awake(scenario: Scenario) -> Client<'static> {
+    let world = World::new(image(), scenario.unattended()).unwrap();
+    let mut client = Client::new(world, MASTER);
+    client.listen(Time::from_ms(700));
+    client
 }
 
-fn startup(world: &mut World<'_>, bits: u32) {
-    let bytes = bits.to_le_bytes();
-    write(world, MASTER, (NMT_STARTUP, 0), &bytes).unwrap();
+/// A client of the board in standby.
+fn in_standby(seed: u64) -> Client<'static> {
+    let mut client = awake(Scenario::new(seed, Time::MAX));
+    comes_to(&mut client.world, READY_BY, |world| world.ready());
+    client
 }
 
-fn assign(world: &mut World<'_>, bits: u32) {
-    let bytes = bits.to_le_bytes();
-    let at = (SLAVE_ASSIGNMENT, NODE.get());
-    write(world, MASTER, at, &bytes).unwrap();
+fn request(client: &mut Client<'_>, node: NodeId, state: u8) {
+    let state = u32::from(state);
+    client.put(REQUEST_NMT, node.get(), state, 1).unwrap();
 }
 
-fn request(world: &mut World<'_>, node: u8, state: u8) {
-    write(world, MASTER, (REQUEST_NMT, node), &[state]).unwrap();
+/// The NMT commands since `from`, with their nodes.
+fn commands(world: &World<'_>, from: Time) -> Vec<[u8; 2]> {
+    let frames = sent(world, NMT, from).into_iter();
+    frames
+        .map(|(_, frame)| [frame.data[0], frame.data[1]])
+        .collect()
 }
 
 /// The frames with this identifier that were on the wire since `from`.
@@ -186,12 +176,8 @@ fn a_drive_that_power_cycles_in_standby_is_booted_again_while_the_rest_runs_on()
     comes_back_and_waits(&mut world);
     assert_logged(&world, "node 4: is back");
     // Nobody else was spoken to.
-    let commands = sent(&world, NMT, from);
-    assert!(
-        commands
-            .iter()
-            .all(|(_, frame)| frame.data[1] == NODE.get())
-    );
+    let commands = commands(&world, from);
+    assert!(commands.iter().all(|[_, node]| *node == NODE.get()));
 }
 
 #[test]
@@ -225,8 +211,11 @@ fn a_drive_whose_process_data_stay_away_is_booted_again() {
 
 #[test]
 fn a_lost_optional_drive_is_left_out_until_it_is_back() {
-    let mut world = standby(54);
-    assign(&mut world, OPTIONAL);
+    let mut client = in_standby(54);
+    client
+        .put(SLAVE_ASSIGNMENT, NODE.get(), OPTIONAL, 4)
+        .unwrap();
+    let mut world = client.world;
     world.press();
     comes_to(&mut world, Time::from_ms(1000), |world| {
         world.in_full_motion()
@@ -252,15 +241,11 @@ fn a_lost_optional_drive_is_left_out_until_it_is_back() {
 
 #[test]
 fn a_missing_optional_drive_holds_nobody_up() {
-    let mut world = standby(55);
-    assign(&mut world, OPTIONAL);
-    let off = world.now();
-    let fault = DriveFault::PowerLoss { at: off };
-    world.apply(Stimulus::Drive { node: NODE, fault });
-    request(&mut world, ALL, RESET_COMMUNICATION);
-    comes_to(&mut world, Time::from_ms(1000), |world| {
-        others(world, |status| status.nmt == nmt::State::PreOperational)
-    });
+    let mut client = awake(Scenario::new(55, Time::MAX).without(NODE));
+    client
+        .put(SLAVE_ASSIGNMENT, NODE.get(), OPTIONAL, 4)
+        .unwrap();
+    let mut world = client.world;
     // Its boot time is 1.5 s.
     comes_to(&mut world, BACK_BY, |world| others(world, enabled));
     assert_logged(&world, "node 4: no boot-up frame");
@@ -280,7 +265,7 @@ fn after_bus_off_the_master_is_silent_and_boots_the_nodes_to_standby() {
     let reset = sent(&world, NMT, off)[0].0;
     // A pause of 100 ms and a silence of 600 ms.
     assert!(reset >= off + Time::from_ms(690), "{reset}");
-    for identifier in [SYNC, 0x700 + MASTER, 0x201, 0x206] {
+    for identifier in [SYNC, 0x77F, 0x201, 0x206] {
         let sent = sent(&world, identifier, off);
         let first = sent[0].0;
         assert!(first > reset, "{identifier:03X}h at {first}");
@@ -313,85 +298,86 @@ fn while_the_bus_stays_bad_the_pauses_grow() {
 
 #[test]
 fn the_start_waits_for_a_request_if_1f80h_says_so() {
-    let mut world = standby(59);
-    startup(&mut world, IS_MASTER | START_ALL | NOT_BY_ITSELF);
-    request(&mut world, ALL, RESET_COMMUNICATION);
-    comes_to(&mut world, BACK_BY, |world| {
+    let mut client = awake(Scenario::new(59, Time::MAX));
+    let bits = IS_MASTER | START_ALL | NOT_BY_ITSELF;
+    client.put(NMT_STARTUP, 0, bits, 4).unwrap();
+    comes_to(&mut client.world, BACK_BY, |world| {
         logged(world, "the start has to be requested")
     });
-    world.run_until(world.now() + WATCHED);
-    let mut statuses = world.statuses().flatten();
-    assert!(statuses.all(|status| status.nmt == nmt::State::PreOperational));
-    drop(statuses);
-    let from = world.now();
-    request(&mut world, MASTER as u8, START);
-    comes_back_and_waits(&mut world);
-    let start = sent(&world, NMT, from);
-    assert_eq!(start[0].1.data[..2], [0x01, 0]);
+    client.listen(WATCHED);
+    for status in client.world.statuses().flatten() {
+        assert_eq!(status.nmt, nmt::State::PreOperational);
+    }
+    let from = client.world.now();
+    request(&mut client, MASTER, START);
+    comes_back_and_waits(&mut client.world);
+    let commands = commands(&client.world, from);
+    assert_eq!(commands, [[0x01, 0]]);
 }
 
 #[test]
-fn nodes_that_the_master_does_not_start_are_started_by_request_one_by_one() {
-    let mut world = standby(60);
-    startup(&mut world, IS_MASTER | NO_START);
-    request(&mut world, ALL, RESET_COMMUNICATION);
-    comes_to(&mut world, BACK_BY, |world| {
+fn nodes_that_the_master_does_not_start_are_started_by_request() {
+    let mut client = awake(Scenario::new(60, Time::MAX));
+    let bits = IS_MASTER | START_ALL | NO_START;
+    client.put(NMT_STARTUP, 0, bits, 4).unwrap();
+    comes_to(&mut client.world, BACK_BY, |world| {
         logged(world, "the nodes are to be started by request")
     });
-    let from = world.now();
+    let from = client.world.now();
     for node in 1..=6 {
-        request(&mut world, node, START);
+        request(&mut client, NodeId::new(node).unwrap(), START);
     }
-    comes_back_and_waits(&mut world);
-    let started = sent(&world, NMT, from);
-    let started: Vec<[u8; 2]> = started
-        .iter()
-        .map(|(_, frame)| [frame.data[0], frame.data[1]])
-        .collect();
-    assert_eq!(started, [[1, 1], [1, 2], [1, 3], [1, 4], [1, 5], [1, 6]]);
+    comes_back_and_waits(&mut client.world);
+    let commands = commands(&client.world, from);
+    assert_eq!(commands, [1, 2, 3, 4, 5, 6].map(|node| [0x01, node]));
 }
 
 #[test]
 fn without_bit_1_of_1f80h_nodes_are_started_one_by_one() {
-    let mut world = standby(61);
-    startup(&mut world, IS_MASTER);
-    let from = world.now();
-    request(&mut world, ALL, RESET_COMMUNICATION);
-    comes_to(&mut world, BACK_BY, |world| world.ready());
-    let commands = sent(&world, NMT, from);
-    let starts = commands.iter().filter(|(_, frame)| frame.data[0] == 1);
-    let starts: Vec<u8> = starts.map(|(_, frame)| frame.data[1]).collect();
-    assert_eq!(starts, [1, 2, 3, 4, 5, 6]);
+    let mut client = awake(Scenario::new(61, Time::MAX));
+    client.put(NMT_STARTUP, 0, IS_MASTER, 4).unwrap();
+    comes_to(&mut client.world, BACK_BY, |world| world.ready());
+    let mut commands = commands(&client.world, Time::ZERO);
+    commands.retain(|[command, _]| *command == 0x01);
+    assert_eq!(commands, [1, 2, 3, 4, 5, 6].map(|node| [0x01, node]));
 }
 
 #[test]
-fn a_drive_to_be_kept_alive_is_not_reset_with_the_others() {
-    let mut world = standby(62);
-    assign(&mut world, MANDATORY | KEEP_ALIVE);
+fn a_drive_to_be_kept_alive_is_left_running_by_a_reset_of_the_board() {
+    let mut client = awake(Scenario::new(62, Time::MAX));
+    let bits = MANDATORY | KEEP_ALIVE;
+    client.put(SLAVE_ASSIGNMENT, NODE.get(), bits, 4).unwrap();
+    let save = Address::new(0x1010, 1);
+    client.write(save, b"save", Protocol::Normal).unwrap();
+    let mut world = client.world;
+    comes_to(&mut world, BACK_BY, |world| world.ready());
     // It does not watch the master (1016h): an EPOS4 that misses it can only go on
     // after a reset of its communication.
-    write(&mut world, u16::from(NODE.get()), (0x1016, 1), &[0; 4]).unwrap();
+    let write = [0x23, 0x16, 0x10, 1, 0, 0, 0, 0];
+    let own = u16::from(NODE.get());
+    assert!(world.say(WireFrame::standard(0x600 + own, &write)));
+    world.run_until(world.now() + Time::from_ms(10));
     let from = world.now();
-    spoil(&mut world, SYNC);
+    world.apply(Stimulus::Reset(true));
+    world.schedule(from + Time::from_ms(1), Stimulus::Reset(false));
     comes_to(&mut world, BACK_BY, |world| {
         logged(world, "node 4: was operational already and is left running")
     });
     comes_back_and_waits(&mut world);
     // Neither a reset of all nor one of this node, and no boot-up message of it.
-    let commands = sent(&world, NMT, from);
-    let resets = commands.iter().filter(|(_, frame)| frame.data[0] == 0x82);
-    let resets: Vec<u8> = resets.map(|(_, frame)| frame.data[1]).collect();
-    assert_eq!(resets, [1, 2, 3, 5, 6]);
-    let own = sent(&world, 0x700 + u16::from(NODE.get()), from);
+    let mut commands = commands(&world, from);
+    commands.retain(|[command, _]| *command == 0x82);
+    assert_eq!(commands, [1, 2, 3, 5, 6].map(|node| [0x82, node]));
+    let own = sent(&world, 0x700 + own, from);
     assert!(own.iter().all(|(_, frame)| frame.data[0] != 0));
 }
 
 #[test]
 fn a_drive_that_is_reset_by_request_comes_back_alone() {
-    let mut world = standby(63);
-    request(&mut world, NODE.get(), RESET_COMMUNICATION);
-    comes_to(&mut world, Time::from_ms(200), |world| {
-        !world.ready() && logged(world, "node 4: lost, to be booted again")
-    });
+    let mut client = in_standby(63);
+    request(&mut client, NODE, RESET_COMMUNICATION);
+    let mut world = client.world;
     comes_back_and_waits(&mut world);
+    assert_logged(&world, "node 4: lost, to be booted again");
+    assert_logged(&world, "node 4: is back");
 }

@@ -427,7 +427,7 @@ mod app {
         let axes = cx.local.axes;
         axes.read(&cycle, |slot| cx.shared.od.lock(|od| od.tpdo(slot)));
         axes.step(&control);
-        let enabled = axes.enabled();
+        let enabled = axes.enabled(&control);
         (&mut cx.shared.control, &mut cx.shared.commands).lock(|control, commands| {
             control.axes_enabled = enabled;
             *commands = *axes.commands();

@@ -64,11 +64,15 @@ impl Axes {
         &self.commands
     }
 
-    /// Whether an axis is enabled or led there.
-    pub(crate) fn enabled(&self) -> bool {
+    /// Whether an axis is enabled or led there. What was last heard of a node that
+    /// is booted again does not count.
+    pub(crate) fn enabled(&self, control: &Control) -> bool {
         let led = !matches!(self.group.state(), GroupState::Idle | GroupState::Faulted);
-        let is = |feedback: &AxisFeedback| StatusWord(feedback.statusword).state().is_enabled();
-        led || self.feedback.iter().any(is)
+        let is = |(axis, feedback): (usize, &AxisFeedback)| {
+            control.operational & 1 << axis != 0
+                && StatusWord(feedback.statusword).state().is_enabled()
+        };
+        led || self.feedback.iter().enumerate().any(is)
     }
 
     /// What the group has to report.
