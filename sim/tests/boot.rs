@@ -248,7 +248,7 @@ fn a_missing_optional_drive_holds_nobody_up() {
     let mut world = client.world;
     // Its boot time is 1.5 s.
     comes_to(&mut world, BACK_BY, |world| others(world, enabled));
-    assert_logged(&world, "node 4: no boot-up frame");
+    assert_logged(&world, "node 4: boot status B: no boot-up frame");
     assert_logged(&world, "network ready");
 }
 
