@@ -48,9 +48,11 @@ pub const SYNC_LIMITS: SyncLimits = SyncLimits {
     shortest_window: TPDO_DEADLINE_US as u32 + 2_000,
 };
 
-/// Changed settings that may wait for `network`: those of every node at once,
-/// and one that the ring leaves empty.
-pub const ORDER_QUEUE: usize = 2 * AXES;
+/// Changed settings that may wait for `network`, which takes them every
+/// millisecond: a write of 1016h makes one for each node, one for a node outside
+/// the network, and a client has no time for more than four writes (of two frames
+/// of at least 111 bits each at 1 Mbit/s). The rest is the ring's empty place.
+pub const ORDER_QUEUE: usize = 4 * (AXES + 2);
 
 /// Frames that may wait for a task, plus one that the ring leaves empty. The
 /// tasks are woken by the first; this is a burst from every node at once.
