@@ -5,6 +5,7 @@ Drive 4 is missing, so that there is an emergency to see, and the board stays in
 pre-operational.
 """
 
+import contextlib
 import struct
 
 import canopen
@@ -26,6 +27,9 @@ TOO_LONG = 0x0607_0012
 TOO_SHORT = 0x0607_0013
 DEVICE_STATE = 0x0800_0022
 CANNOT_STORE = 0x0800_0020
+# Segments in a block, and bytes in a segment.
+BLOCK = 127
+SEGMENT = 7
 # "save", as 1010h wants it.
 SAVE = b"save"
 
@@ -69,6 +73,16 @@ class Board(OnTheBus):
 
     def heartbeat(self):
         return number(self.sdo.upload(HEARTBEAT, 0))
+
+    def sized_by_nobody(self, index, data):
+        stream = self.sdo.open(index, 0, "wb", block_transfer=True, buffering=0)
+        try:
+            for start in range(0, len(data), SEGMENT):
+                stream.write(data[start : start + SEGMENT])
+        finally:
+            # Ends a transfer that is over already.
+            with contextlib.suppress(canopen.SdoAbortedError):
+                stream.close()
 
     def test_expedited_transfer(self):
         self.assertEqual(len(self.sdo.upload(0x1000, 0)), 4)
@@ -118,6 +132,9 @@ class Board(OnTheBus):
                 self.aborts(code, self.sdo.download, index, sub, data)
                 self.aborts(code, self.sdo.download, index, sub, data, force_segment=True)
                 self.aborts(code, block_write, self.sdo, index, sub, data)
+        # The client does not tell how much it is, and sends the whole block.
+        self.aborts(TOO_LONG, self.sized_by_nobody, HEARTBEAT, bytes(BLOCK * SEGMENT))
+        self.assertEqual(self.sdo.upload(0x1008, 0), NAME)
         self.aborts(NO_SUCH_OBJECT, self.sdo.upload, 0x5FFF, 0)
         self.aborts(NO_SUCH_OBJECT, block_read, self.sdo, 0x5FFF, 0)
 

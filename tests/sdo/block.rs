@@ -200,6 +200,34 @@ fn what_the_server_refuses() {
 }
 
 #[test]
+fn a_refusal_waits_for_the_end_of_the_block_so_that_no_segment_is_taken_for_a_command() {
+    let at = [0x17, 0x10, 0];
+    let open = |b: &mut Bench| {
+        b.expect(
+            [0xC4, 0x17, 0x10, 0, 0, 0, 0, 0],
+            [0xA4, 0x17, 0x10, 0, 127, 0, 0, 0],
+        );
+    };
+    let mut b = Bench::new();
+    open(&mut b);
+    for sequence in 1..127 {
+        // The segment 2Fh would write 5 to 6060h.
+        assert_eq!(b.ask([sequence, 0x60, 0x60, 0, 5, 0, 0, 0]), None);
+    }
+    let last = [127, 0x60, 0x60, 0, 5, 0, 0, 0];
+    b.expect(last, abort(at, AbortCode::TOO_LONG));
+    assert!(b.server.is_idle());
+    assert_eq!(b.od.values.number(0x6060, 0), 1);
+    // The rest does not come.
+    open(&mut b);
+    for sequence in 1..=3 {
+        assert_eq!(b.ask([sequence, 0, 0, 0, 0, 0, 0, 0]), None);
+    }
+    assert_eq!(b.segment(ms(250)), Some(abort(at, AbortCode::TOO_LONG)));
+    assert!(b.server.is_idle());
+}
+
+#[test]
 fn a_server_without_block_transfer() {
     let mut b = Bench::new();
     b.server = Server::new(NODE, TIMEOUT).with_block_size(0);

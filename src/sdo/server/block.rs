@@ -49,6 +49,7 @@ impl Server {
         self.state = State::BlockDownload {
             sink: Sink::open(od, at, size)?,
             receiver: Receiver::new(block_size, crc),
+            refused: None,
         };
         Ok(Some(Answer::BlockDownload {
             at,
@@ -60,13 +61,22 @@ impl Server {
     /// While a block is being received a frame has no command specifier, except
     /// for an abort. `None` if this is no such moment.
     ///
+    /// A refusal waits for the end of the block: the client may have sent it all
+    /// before it learns of the abort, and with the transfer gone a segment would be
+    /// taken for a command, that with the number 23h for a download.
+    ///
     /// CiA 301, 7.2.4.3.10.
     pub(super) fn block_segment(
         &mut self,
         bytes: Bytes,
         od: &mut impl ObjectDictionary,
     ) -> Option<Reply> {
-        let State::BlockDownload { sink, receiver } = &mut self.state else {
+        let State::BlockDownload {
+            sink,
+            receiver,
+            refused,
+        } = &mut self.state
+        else {
             return None;
         };
         if receiver.is_complete() {
@@ -78,23 +88,28 @@ impl Server {
                 _ => Some(Err(AbortCode::SEQUENCE_NUMBER)),
             };
         };
-        let before = receiver.segment(segment);
-        let answer = receiver
-            .over()
-            .map(|sequence| Answer::BlockDownloadAcknowledge {
-                sequence,
-                block_size: receiver.block_size(),
-            });
-        Some(match before {
-            Ok(Some(data)) => sink.push(od, &data, false).map(|()| answer),
-            Ok(None) => Ok(answer),
-            Err(code) => Err(code),
+        let answer = match receiver.segment(segment) {
+            Ok(before) => {
+                if let (Some(data), None) = (before, &refused) {
+                    *refused = sink.push(od, &data, false).err();
+                }
+                let over = receiver.over();
+                over.map(|sequence| Answer::BlockDownloadAcknowledge {
+                    sequence,
+                    block_size: receiver.block_size(),
+                })
+            }
+            Err(code) => return Some(Err(code)),
+        };
+        Some(match (answer, *refused) {
+            (Some(_), Some(code)) => Err(code),
+            (answer, _) => Ok(answer),
         })
     }
 
     /// CiA 301, 7.2.4.3.11.
     fn block_download_end(&mut self, end: End, od: &mut impl ObjectDictionary) -> Reply {
-        let State::BlockDownload { sink, receiver } = &mut self.state else {
+        let State::BlockDownload { sink, receiver, .. } = &mut self.state else {
             return Err(AbortCode::COMMAND);
         };
         let (data, len) = receiver.end(end)?;
@@ -189,6 +204,10 @@ impl Server {
                 }
                 None => None,
             },
+            State::BlockDownload {
+                refused: Some(code),
+                ..
+            } => return Err(*code),
             State::BlockDownload { receiver, .. } => receiver.stall().map(|sequence| {
                 let block_size = receiver.block_size();
                 Answer::BlockDownloadAcknowledge {

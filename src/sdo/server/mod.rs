@@ -49,6 +49,8 @@ enum State {
     BlockDownload {
         sink: Sink,
         receiver: Receiver,
+        /// The entry has refused what came.
+        refused: Option<AbortCode>,
     },
     BlockUpload {
         source: Source,
