@@ -34,10 +34,21 @@ impl Instant {
     }
 }
 
+/// The earlier of two deadlines of which each may be none.
+pub(crate) fn earliest(a: Option<Instant>, b: Option<Instant>) -> Option<Instant> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some(if b < a { b } else { a }),
+        (a, None) => a,
+        (None, b) => b,
+    }
+}
+
 impl Add<Duration> for Instant {
     type Output = Instant;
     fn add(self, d: Duration) -> Instant {
-        Instant(self.0.saturating_add(d.0 as u64))
+        // Never wraps: see the type. Saturating would be paid for at each of the
+        // many places where a deadline is set.
+        Instant(self.0.wrapping_add(d.0 as u64))
     }
 }
 

@@ -10,7 +10,7 @@ use super::settings::{Settings, Startup};
 use crate::frame::Frame;
 use crate::id::{CobId, FunctionCode, NodeId};
 use crate::network::Network;
-use crate::time::{Duration, Instant};
+use crate::time::{Duration, Instant, earliest};
 use core::mem::MaybeUninit;
 use heapless::{Deque, Vec};
 
@@ -260,13 +260,14 @@ impl<const N: usize> NetworkBoot<N> {
 
     /// When [`poll`](Self::poll) has to be called again at the latest.
     pub fn next_deadline(&self) -> Option<Instant> {
-        let search = self.factory.next_deadline();
-        self.nodes
-            .iter()
-            .filter_map(NodeBoot::next_deadline)
-            .chain(self.phase.deadline())
-            .chain(search.filter(|_| self.phase.listens()))
-            .min()
+        let mut next = self.phase.deadline();
+        if self.phase.listens() {
+            next = earliest(next, self.factory.next_deadline());
+        }
+        for node in &self.nodes {
+            next = earliest(next, node.next_deadline());
+        }
+        next
     }
 
     pub(super) fn report(&mut self, event: Event) {

@@ -52,7 +52,7 @@ use crate::network::Network;
 use crate::nmt::{NodeControl, Service, State, Target};
 use crate::sdo::{AbortCode, Server};
 use crate::sync::SyncLimits;
-use crate::time::{Duration, Instant};
+use crate::time::{Duration, Instant, earliest};
 use crate::time_of_day::{self, TimeOfDay};
 use dictionary::{Dictionary, View};
 use node_record::Presence;
@@ -353,14 +353,14 @@ impl<const N: usize> Device<N> {
         let state = self.dictionary.state;
         let errors = self.dictionary.errors.next_deadline();
         let time = self.time.next_deadline();
-        [
-            errors.filter(|_| state.allows(Service::Emergency)),
-            time.filter(|_| state.allows(Service::Time)),
-            self.server.next_deadline(),
-        ]
-        .into_iter()
-        .flatten()
-        .min()
+        let mut next = self.server.next_deadline();
+        if state.allows(Service::Emergency) {
+            next = earliest(next, errors);
+        }
+        if state.allows(Service::Time) {
+            next = earliest(next, time);
+        }
+        next
     }
 
     /// Whether TIME is produced, and how often.

@@ -642,8 +642,10 @@ mod app {
             }
             roll::check_in(Task::SdoConfigurator);
             let latest = now(*local.clock) + design::CONFIGURATOR_PERIOD;
-            let next = [boot.next_deadline(), own.device.next_deadline()];
-            let next = next.into_iter().flatten().fold(latest, Instant::min);
+            let mut next = latest;
+            for deadline in [boot.next_deadline(), own.device.next_deadline()] {
+                next = deadline.map_or(next, |deadline| deadline.min(next));
+            }
             CONFIGURATOR.at(next.as_micros() as u32);
             wake.wait().await;
         }

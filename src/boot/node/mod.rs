@@ -11,7 +11,7 @@ use crate::network::{self, Network, Node};
 use crate::nmt::{Command, Guardian, NodeControl};
 use crate::objects;
 use crate::sdo::Client;
-use crate::time::{Duration, Instant};
+use crate::time::{Duration, Instant, earliest};
 use heapless::Deque;
 use state::{AwaitBootUp, AwaitErrorControl, AwaitReset, GivenUp, Identify, Idle, Missing, State};
 
@@ -228,10 +228,8 @@ impl NodeBoot {
             true => self.guardian.next_deadline(),
             false => None,
         };
-        [self.state.deadline(), self.client.next_deadline(), guard]
-            .into_iter()
-            .flatten()
-            .min()
+        let next = earliest(self.state.deadline(), self.client.next_deadline());
+        earliest(next, guard)
     }
 
     /// The time of a state is over.
