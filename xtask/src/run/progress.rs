@@ -38,6 +38,8 @@ pub(super) struct Progress {
     next: Time,
     step: &'static str,
     answers: Vec<usize>,
+    /// The master has sent its first NMT command: the silent phase is over.
+    commanded: bool,
     /// The master looks for drives without node-ID.
     search: bool,
     records_seen: usize,
@@ -60,6 +62,7 @@ impl Progress {
             next: Time::ZERO,
             step: "",
             answers: vec![0; world::network().nodes.len()],
+            commanded: false,
             search: false,
             records_seen: 0,
         }
@@ -106,6 +109,13 @@ impl Progress {
                 format!("round trip {}, positions {}", done + 1, positions(world)),
             );
         }
+        if !self.commanded {
+            let silence = world::network().master.silence.as_millis();
+            return (
+                "silent, so that drives left running come to rest",
+                format!("{silence} ms in all"),
+            );
+        }
         if self.search
             && let Some(nodes) = still_to_come(world, world::has_node_id)
         {
@@ -115,10 +125,14 @@ impl Progress {
             return ("waiting for the drives to boot", nodes);
         }
         if let Some(nodes) = still_to_come(world, world::operational) {
-            return (
-                "configuring the drives",
-                format!("{}; {nodes}", self.configured()),
-            );
+            let (answers, all) = self.configured();
+            if answers < all {
+                return (
+                    "configuring the drives",
+                    format!("{answers} of {all} SDO transfers; {nodes}"),
+                );
+            }
+            return ("starting the drives", nodes);
         }
         if let Some(nodes) = still_to_come(world, world::enabled) {
             return ("enabling the drives", nodes);
@@ -138,6 +152,7 @@ impl Progress {
             let WireId::Standard(id) = frame.id else {
                 continue;
             };
+            self.commanded |= id == CobId::NMT.get();
             self.search |= id == CobId::LSS_MASTER.get();
             let answers = |node: &network::Node| id == SDO_ANSWER + u16::from(node.id.get());
             let axis = network.nodes.iter().position(answers);
@@ -148,8 +163,8 @@ impl Progress {
         self.records_seen = wire.len();
     }
 
-    /// How much of its configuration each node has answered.
-    fn configured(&self) -> String {
+    /// How much of their configuration the nodes have answered, and all of it.
+    fn configured(&self) -> (usize, usize) {
         let network = world::network();
         let answers: usize = self.answers.iter().sum();
         let all: usize = network
@@ -157,7 +172,7 @@ impl Progress {
             .iter()
             .map(|node| network::plan(network, node).count() + reads(node))
             .sum();
-        format!("{} of {all} SDO transfers", answers.min(all))
+        (answers.min(all), all)
     }
 }
 
