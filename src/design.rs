@@ -4,6 +4,11 @@
 use crate::sync::SyncLimits;
 use crate::time::Duration;
 
+/// What the board is called (1008h).
+pub const DEVICE_NAME: &str = "canmaster";
+/// On what hardware it is (1009h).
+pub const HARDWARE_VERSION: &str = "NUCLEO-G474RE";
+
 /// Axes of the group.
 pub const AXES: usize = 6;
 

@@ -111,6 +111,11 @@ impl<const N: usize> Dictionary<N> {
         }
     }
 
+    pub(super) fn entry(&self, at: Address) -> Result<Entry, AbortCode> {
+        let found = self.find(at)?;
+        Ok(Entry::new(found.data_type, found.access))
+    }
+
     /// The last entry of this row that the object has; `None` if there is no such
     /// object.
     fn last_sub(&self, row: &Row, found: &Found) -> Option<u8> {
@@ -387,8 +392,7 @@ fn sdo_channel(sub: u8, server: NodeId) -> u32 {
 
 impl<B: Board, const N: usize> ObjectDictionary for View<'_, B, N> {
     fn entry(&self, at: Address) -> Result<Entry, AbortCode> {
-        let found = self.dictionary.find(at)?;
-        Ok(Entry::new(found.data_type, found.access))
+        self.dictionary.entry(at)
     }
 
     /// The ranges of the settings are theirs to check.

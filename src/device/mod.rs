@@ -47,9 +47,10 @@ pub use transfer::{TransferResult, TransferTest};
 use crate::boot::{self, Startup};
 use crate::emcy::{self, Emcy, EmcyCode};
 use crate::frame::{Frame, MAX_DATA};
-use crate::id::NodeId;
+use crate::id::{Address, NodeId};
 use crate::network::Network;
 use crate::nmt::{NodeControl, Service, State, Target};
+use crate::od::Entry;
 use crate::sdo::{AbortCode, Server};
 use crate::sync::SyncLimits;
 use crate::time::{Duration, Instant, earliest};
@@ -192,6 +193,15 @@ impl<const N: usize> Device<N> {
         dictionary.is_master = dictionary.settings.startup().has(Startup::MASTER);
         dictionary.settings.set_sync_producer(producing);
         self.start_time(now);
+    }
+
+    /// Type and access of an entry of the dictionary, as an EDS of the device has
+    /// to tell them.
+    ///
+    /// # Errors
+    /// 06020000h if the object, 06090011h if the sub-index does not exist.
+    pub fn entry(&self, at: Address) -> Result<Entry, AbortCode> {
+        self.dictionary.entry(at)
     }
 
     /// The settings in force.

@@ -36,8 +36,8 @@ const SDO_TIMEOUT: Duration = Duration::from_millis(500);
 fn description() -> Description {
     Description {
         device_type: 0,
-        name: "canmaster",
-        hardware: "NUCLEO-G474RE",
+        name: design::DEVICE_NAME,
+        hardware: design::HARDWARE_VERSION,
         software: env!("CARGO_PKG_VERSION"),
         identity: Identity {
             serial: nucleo_g474re::serial_number(),

@@ -10,9 +10,9 @@ use canmaster_network::layout::{Layout, SlotKind};
 use canmaster_network::model::{Bus, Machine};
 use canmaster_network::{Severity, load};
 
-use crate::cargo;
 use crate::cli::CheckOptions;
 use crate::table;
+use crate::{board_eds, cargo, library};
 
 /// The description of this project.
 pub(crate) const DESCRIPTION: &str = "network.toml";
@@ -147,6 +147,9 @@ fn derived(machine: &Machine, folder: &Path) -> Result<()> {
     fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     for (place, bus) in machine.buses.iter().enumerate() {
         write(format!("{}.dbc", bus.name), dbc(machine, place).as_bytes())?;
+        let network = library::network(machine, place)?;
+        let eds = board_eds::eds(machine, place, network);
+        write(format!("{}-master.eds", bus.name), eds.write().as_bytes())?;
     }
     for node in &machine.nodes {
         let bytes = concise_dcf(&machine.master, node);

@@ -2,6 +2,8 @@
 
 mod attach;
 mod bench;
+mod board_eds;
+mod board_names;
 mod campaign;
 mod capacity;
 mod cargo;
@@ -12,6 +14,7 @@ mod conformance;
 mod firmware;
 mod image;
 mod interop;
+mod library;
 mod new;
 mod report;
 mod run;
