@@ -8,7 +8,7 @@ use canmaster::device::{Board, Description, Device, Identity};
 use canmaster::frame::{Frame, MAX_DATA};
 use canmaster::id::{Address, CobId, FunctionCode, NodeId};
 use canmaster::network::Network;
-use canmaster::nmt::State;
+use canmaster::nmt::{NodeControl, State};
 use canmaster::objects::SERIAL_NUMBER;
 use canmaster::od;
 use canmaster::sdo::AbortCode;
@@ -44,6 +44,10 @@ impl Board for Bench {
 
     fn can_save(&self) -> bool {
         true
+    }
+
+    fn may_request(&mut self, _: NodeControl) -> Result<(), AbortCode> {
+        Err(AbortCode::DEVICE_STATE)
     }
 
     fn tpdo(&mut self, _: NodeId, _: u8) -> [u8; MAX_DATA] {
@@ -204,6 +208,8 @@ mod tests {
         for (at, object, entry) in sample().entries() {
             assert_ne!(object.name, board_names::NAMELESS, "{at}");
             assert!(!entry.name.is_empty(), "{at}");
+            // A variable by its name has no entries.
+            assert!(at.sub == 0 || entry.name != object.name, "{at}");
         }
     }
 

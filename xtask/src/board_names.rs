@@ -158,6 +158,19 @@ const ROWS: &[Row] = &[
     row(0x2F02, "Newest emergency in words", Subs::PerNode),
     row(0x2F10, "Clock of the master", Subs::None),
     row(0x2F11, "Period of TIME", Subs::None),
+    row(
+        0x2F12,
+        "Transfer test",
+        Subs::Named(&[
+            "Entry of a node",
+            "Bytes",
+            "Seed of the data",
+            "Start",
+            "Bytes transferred",
+            "Time in microseconds",
+            "Result",
+        ]),
+    ),
     rows(
         0x2F80,
         IDS,
