@@ -43,14 +43,19 @@ pub const TX_QUEUE: usize = 36;
 /// at 1 Mbit/s for longer than the millisecond after which the next are made.
 pub const OWN_FRAMES: usize = 10;
 
+/// From the first RPDO of a cycle handed over to the last one sent, in
+/// microseconds: six of six bytes and six of eight take 1.5 ms on the wire at
+/// worst, after a frame that is on it.
+pub const RPDOS_US: u16 = 2_000;
+
 /// What the firmware can do of 1006h and 1007h. The shortest period is the
 /// deadline of the TPDOs and as much again for the RPDOs; the longest is what the
-/// 16 bits of the deadline's timer count. The window has to hold the deadline,
-/// twelve RPDOs at worst (1.6 ms) and a frame that is on the bus.
+/// 16 bits of the deadline's timer count. The window has to hold deadline, steps
+/// of the axes, and RPDOs.
 pub const SYNC_LIMITS: SyncLimits = SyncLimits {
     shortest_period: 2 * TPDO_DEADLINE_US as u32,
     longest_period: u16::MAX as u32,
-    shortest_window: TPDO_DEADLINE_US as u32 + 2_000,
+    shortest_window: (TPDO_DEADLINE_US + RPDOS_US) as u32 + 500,
 };
 
 /// Changed settings that may wait for `network`, which takes them every

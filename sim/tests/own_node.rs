@@ -7,6 +7,7 @@ use canmaster::id::Address;
 use canmaster::nmt::{Command, NodeControl};
 use canmaster::sdo::{AbortCode, Protocol, SdoError};
 use canmaster::{CobId, Frame, NodeId};
+use canmaster_sim::board::irqs;
 use canmaster_sim::drive::DriveFault;
 use canmaster_sim::time::Time;
 use canmaster_sim::world::{Client, Scenario, Stimulus, World, enabled};
@@ -309,7 +310,7 @@ fn the_sync_follows_1005h_1006h_and_1019h_in_pre_operational() {
     let mut client = alone(41);
     refused(client.put(0x1006, 0, 65_536, 4), AbortCode::VALUE_TOO_HIGH);
     refused(client.put(0x1006, 0, 9_999, 4), AbortCode::VALUE_TOO_LOW);
-    refused(client.put(0x1007, 0, 6_999, 4), AbortCode::VALUE_TOO_LOW);
+    refused(client.put(0x1007, 0, 7_499, 4), AbortCode::VALUE_TOO_LOW);
     refused(client.put(0x1007, 0, 10_001, 4), AbortCode::VALUE_TOO_HIGH);
     refused(client.put(0x1019, 0, 3, 1), AbortCode::DEVICE_STATE);
     client.put(0x1006, 0, 0, 4).unwrap();
@@ -335,6 +336,48 @@ fn the_sync_follows_1005h_1006h_and_1019h_in_pre_operational() {
     client.take_heard();
     client.listen(Time::from_ms(100));
     assert!(client.heard_from(0x080).is_empty());
+}
+
+/// CiA 301, 7.5.2.7: what would come after the window is not sent.
+#[test]
+fn synchronous_pdos_keep_to_the_window_of_1007h() {
+    const WINDOW: Time = Time::from_us(7_500);
+    let mut client = alone(43);
+    client.put(0x1007, 0, 7_500, 4).unwrap();
+    client
+        .write(at(0x1010, 1), b"save", Protocol::Normal)
+        .unwrap();
+    let stored = client.world.board().bank2();
+    let mut client = self::client(Scenario::new(44, END).stored(stored));
+    assert!(client.world.run_to(Time::from_ms(4000), all_enabled));
+    client.world.apply(Stimulus::DelayIrq {
+        irq: irqs::TIM3,
+        // 9 ms: past the window in a good part of the cycles.
+        max_cycles: 170_000 * 9,
+    });
+    client.take_heard();
+    client.listen(Time::from_ms(600));
+    let mut sync = None;
+    let (mut sent, mut cycles) = (0, 0);
+    for (at, frame) in client.take_heard() {
+        match frame.id().get() {
+            0x080 => {
+                cycles += 1;
+                sync = Some(at);
+            }
+            0x201..=0x206 | 0x301..=0x306 => {
+                sent += 1;
+                // As seen by somebody who looks every 200 us.
+                let late = sync.map(|sync| at - sync);
+                assert!(late <= Some(WINDOW + Time::from_us(400)), "{late:?}");
+            }
+            _ => {}
+        }
+    }
+    assert!(
+        sent > 0 && sent < cycles * 5,
+        "{sent} RPDOs in {cycles} cycles"
+    );
 }
 
 /// CiA 301, 7.2.6.

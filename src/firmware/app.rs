@@ -432,7 +432,7 @@ mod app {
             control.axes_enabled = enabled;
             *commands = *axes.commands();
         });
-        if control.window_us != 0 && cx.local.deadline.elapsed_us() > control.window_us {
+        if cx.local.deadline.elapsed_us() > control.latest_us {
             // What comes after the window of the SYNC is not sent any more.
             counters::RPDO_REPLACED.count();
         } else if control.leads() && !control.bus_off {

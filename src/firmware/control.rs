@@ -33,8 +33,9 @@ pub struct Control {
     pub(crate) axes_enabled: bool,
     /// 1006h is not the cycle that the group is made for: no axis is enabled.
     pub(crate) cycle_differs: bool,
-    /// 1007h, microseconds; 0: none.
-    pub(crate) window_us: u16,
+    /// When RPDOs may be handed over at the latest to be sent within 1007h, in
+    /// microseconds after the SYNC.
+    pub(crate) latest_us: u16,
     /// The NMT state that a command has brought the board to; `None`: the one
     /// that the start of the network has.
     pub(crate) commanded: Option<nmt::State>,
@@ -54,7 +55,7 @@ impl Control {
             bus_off: false,
             axes_enabled: false,
             cycle_differs: false,
-            window_us: 0,
+            latest_us: u16::MAX,
             commanded: None,
         }
     }

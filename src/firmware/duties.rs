@@ -89,10 +89,12 @@ pub(crate) fn order_boot(
 ) {
     let control = match *event {
         Event::Nmt(control) => {
-            own.command(control);
             // The boot-up has no say in what the board itself does, except that it
             // starts the network.
             let mine = control.target == Target::Node(own.network().master.node);
+            if mine {
+                own.command(control);
+            }
             if mine && (control.command != Command::Start || !own.device.is_master()) {
                 return;
             }
@@ -161,7 +163,11 @@ fn take_over(
     let anew = setting == Setting::SyncOverflow || state == State::Stopped;
     shared.control.lock(|control| {
         control.cycle_differs = differs;
-        control.window_us = sync.window() as u16;
+        control.latest_us = match sync.window() {
+            0 => u16::MAX,
+            // Nothing shorter than that is taken.
+            window => (window as u16).saturating_sub(design::RPDOS_US),
+        };
     });
     shared.od.lock(|od| {
         od.set_sync_producer(produces);

@@ -4,7 +4,7 @@
 //! NMT commands for the board, from the bus or by 1F82h, and what 1029h orders on
 //! a communication error, are carried out whether or not it is the NMT master
 //! (1F80h, bit 0), but never while an axis is enabled, which would be left without
-//! its master: 1F82h is refused then, a command from the bus to the board alone is
+//! its master: 1F82h:7Fh is refused then (1F82h:80h is for the other nodes), a command from the bus to the board alone is
 //! left, and one to all nodes waits until the axes, whose drives have heard it
 //! too, are off. Reset node and reset communication both start the board anew.
 
