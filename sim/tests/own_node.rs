@@ -350,10 +350,16 @@ fn synchronous_pdos_keep_to_the_window_of_1007h() {
     let stored = client.world.board().bank2();
     let mut client = self::client(Scenario::new(44, END).stored(stored));
     assert!(client.world.run_to(Time::from_ms(4000), all_enabled));
+    // A TPDO is missing, so that the deadline makes the cycle, and it is late:
+    // past the window in a good part of the cycles.
+    let at = client.world.now();
+    client.world.apply(Stimulus::Drive {
+        node: NodeId::constant::<3>(),
+        fault: DriveFault::TpdosLost { at },
+    });
     client.world.apply(Stimulus::DelayIrq {
         irq: irqs::TIM3,
-        // 9 ms: past the window in a good part of the cycles.
-        max_cycles: 170_000 * 9,
+        max_cycles: 170_000 * 4,
     });
     client.take_heard();
     client.listen(Time::from_ms(600));

@@ -621,10 +621,12 @@ mod app {
             if bus_off && !boot.is_silent() {
                 boot.bus_off(now(*local.clock));
             }
+            // A board that is stopped has neither SDO nor SYNC: the boot-up waits.
+            let held = own.device.state() == nmt::State::Stopped && !bus_off;
             // The time first, then one frame at a time: each may cause several
             // actions, which are carried out before the next.
             loop {
-                while let Some(action) = boot.poll(now(*local.clock)) {
+                while !held && let Some(action) = boot.poll(now(*local.clock)) {
                     let period = &mut *local.sync_period;
                     act(&action, own, period, &mut log, &mut cx.shared);
                 }
@@ -642,8 +644,9 @@ mod app {
             }
             roll::check_in(Task::SdoConfigurator);
             let latest = now(*local.clock) + design::CONFIGURATOR_PERIOD;
+            let boots = boot.next_deadline().filter(|_| !held);
             let mut next = latest;
-            for deadline in [boot.next_deadline(), own.device.next_deadline()] {
+            for deadline in [boots, own.device.next_deadline()] {
                 next = deadline.map_or(next, |deadline| deadline.min(next));
             }
             CONFIGURATOR.at(next.as_micros() as u32);

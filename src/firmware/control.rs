@@ -72,16 +72,13 @@ impl Control {
         }
     }
 
-    /// Takes note of where the boot-up stands. `true`: the master may speak from
-    /// now on.
-    pub(crate) fn follow(&mut self, boot: &NetworkBoot<AXES>) -> bool {
+    /// Takes note of where the boot-up stands.
+    pub(crate) fn follow(&mut self, boot: &NetworkBoot<AXES>) {
         self.network_ready = boot.is_ready();
         self.operational = boot.operational();
         self.node_missing = boot.any_given_up();
         self.boot_failed = boot.is_failed();
-        let silent = !self.speaking;
         self.speaking |= !boot.is_silent();
-        silent && self.speaking
     }
 
     /// The NMT state of the board itself.

@@ -133,9 +133,11 @@ pub(crate) fn begin(
 /// Tells the other tasks where the boot-up stands. When its silence is over, the
 /// board leaves initialising, with its boot-up message.
 pub(crate) fn follow(boot: &NetworkBoot<AXES>, own: &OwnNode, shared: &mut Shared<'_>) {
-    if shared.control.lock(|control| control.follow(boot)) {
+    // Queued before `network` may send a heartbeat.
+    if !boot.is_silent() && !shared.control.lock(|control| control.speaking) {
         send(own.boot_up(), shared);
     }
+    shared.control.lock(|control| control.follow(boot));
 }
 
 /// Takes over a setting that a client has changed.
