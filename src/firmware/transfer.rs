@@ -14,7 +14,7 @@ use canmaster::{
     sdo::{AbortCode, AsyncClient, Channel, Link, TestData},
     time::{Duration, Instant},
 };
-use core::sync::atomic::{AtomicU8, AtomicU32, Ordering::Relaxed};
+use core::sync::atomic::{AtomicU16, AtomicU32, Ordering::Relaxed};
 use heapless::spsc::Consumer;
 use nucleo_g474re::{pac::Interrupt, timers::Microseconds};
 use rtic::Mutex;
@@ -24,8 +24,8 @@ use rtic_sync::signal::SignalReader;
 /// it may still have to say is waited for as long.
 const TIMEOUT: Duration = Duration::from_millis(100);
 
-/// The node whose answers are the test's; 0: none.
-static NODE: AtomicU8 = AtomicU8::new(0);
+/// The identifier of the answers that are the test's; 0: none.
+static ANSWERS: AtomicU16 = AtomicU16::new(0);
 static BYTES: AtomicU32 = AtomicU32::new(0);
 static MICROSECONDS: AtomicU32 = AtomicU32::new(0);
 static CODE: AtomicU32 = AtomicU32::new(TransferResult::NONE.code);
@@ -33,12 +33,12 @@ static CODE: AtomicU32 = AtomicU32::new(TransferResult::NONE.code);
 /// Whether the test wants the answers with this identifier.
 #[inline(always)]
 pub(crate) fn wants(id: CobId) -> bool {
-    id.get() as u8 & NodeId::MAX.get() == NODE.load(Relaxed)
+    id.get() == ANSWERS.load(Relaxed)
 }
 
 /// Lets time pass: to be called every millisecond.
 pub(crate) fn tick(now_us: u32) {
-    if NODE.load(Relaxed) != 0 {
+    if ANSWERS.load(Relaxed) != 0 {
         TRANSFER.if_due(now_us);
     }
 }
@@ -104,7 +104,7 @@ pub(crate) async fn run<T: Mutex<T = TxQueue<TX_QUEUE>>>(test: TransferTest, mut
     // It was checked.
     let node = test.node().unwrap_or(NodeId::MAX);
     let mut channel = Channel::new(node, TIMEOUT);
-    NODE.store(node.get(), Relaxed);
+    ANSWERS.store(channel.response_id().get(), Relaxed);
     let begun = bus.counter.now();
     let mut data = TestData::new(test.seed);
     let size = (!test.is_upload()).then_some(test.size);
@@ -117,6 +117,6 @@ pub(crate) async fn run<T: Mutex<T = TxQueue<TX_QUEUE>>>(test: TransferTest, mut
         Ok(_) => AbortCode::LENGTH_MISMATCH.0,
         Err(error) => error.code().0,
     };
-    NODE.store(0, Relaxed);
+    ANSWERS.store(0, Relaxed);
     publish(data.reached(), us, code);
 }
