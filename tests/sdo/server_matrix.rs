@@ -178,8 +178,8 @@ fn wanted(state: State, bytes: [u8; 8], at: Address) -> Wanted {
     if let State::BlockDownload(_) = state {
         let (sequence, last) = (command & 0x7F, command & 0x80 != 0);
         return match sequence {
-            0 if last => Silence,
-            0 => Abort(AbortCode::SEQUENCE_NUMBER),
+            // An abort, or a refusal that waits for the end of the block.
+            0 => Silence,
             _ if last || sequence == 127 => Answer(0xA2),
             _ => Silence,
         };
@@ -422,6 +422,30 @@ fn an_empty_segment_that_is_not_the_last_aborts() {
         Some([0x80, D0, D1, DS, c0, c1, c2, c3])
     );
     assert_eq!(b.od.cancelled, 1);
+}
+
+/// What is left of a block must not be taken for commands.
+#[test]
+fn a_frame_without_sequence_number_aborts_at_the_end_of_the_block() {
+    let [c0, c1, c2, c3] = AbortCode::SEQUENCE_NUMBER.0.to_le_bytes();
+    let abort = Some([0x80, D0, D1, DS, c0, c1, c2, c3]);
+    for last in [0x7F, 0x82] {
+        let mut b = Bench::in_state(State::BlockDownload(1));
+        assert_eq!(b.ask([0; 8]), None);
+        // It would write 1017h.
+        assert_eq!(b.ask([0x2B, 0x17, 0x10, 0, 5, 0, 0, 0]), None);
+        assert_eq!(b.ask([last, 0, 0, 0, 0, 0, 0, 0]), abort);
+        assert!(b.server.is_idle());
+        assert_eq!(b.od.values.number(0x1017, 0), 0);
+    }
+    // The rest does not come, or nothing but that.
+    let mut b = Bench::in_state(State::BlockDownload(1));
+    assert_eq!(b.ask([0; 8]), None);
+    let polled = b.server.poll(ms(250), &mut b.od);
+    assert_eq!(polled.map(|frame| frame.padded()), abort);
+    let mut b = Bench::in_state(State::BlockDownload(1));
+    assert_eq!(b.ask([0; 8]), None);
+    assert_eq!(b.ask([0; 8]), abort);
 }
 
 #[test]

@@ -63,7 +63,8 @@ impl Server {
     ///
     /// A refusal waits for the end of the block: the client may have sent it all
     /// before it learns of the abort, and with the transfer gone a segment would be
-    /// taken for a command, that with the number 23h for a download.
+    /// taken for a command, that with the number 23h for a download. A second frame
+    /// without sequence number is not waited for.
     ///
     /// CiA 301, 7.2.4.3.10.
     pub(super) fn block_segment(
@@ -83,9 +84,13 @@ impl Server {
             return None;
         }
         let Some(segment) = BlockSegment::decode(bytes) else {
-            return match Request::decode(bytes) {
-                Some(Request::Abort { .. }) => None,
-                _ => Some(Err(AbortCode::SEQUENCE_NUMBER)),
+            return match (Request::decode(bytes), *refused) {
+                (Some(Request::Abort { .. }), _) => None,
+                (_, Some(code)) => Some(Err(code)),
+                (_, None) => {
+                    *refused = Some(AbortCode::SEQUENCE_NUMBER);
+                    Some(Ok(None))
+                }
             };
         };
         let answer = match receiver.segment(segment) {
