@@ -496,13 +496,13 @@ impl<const N: usize> Dictionary<N> {
         match event.node() {
             Some(node) => {
                 if let Some(record) = self.record(node) {
-                    record.status = status;
+                    record.step(status);
                 }
             }
             None => {
                 let known = usize::from(nodes::<N>(self.network));
                 for record in self.nodes.iter_mut().take(known) {
-                    record.status = status;
+                    record.step(status);
                 }
             }
         }

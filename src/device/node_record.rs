@@ -142,13 +142,26 @@ pub(super) struct NodeRecord {
     pub(super) emcy: History<Emcy, HISTORY>,
 }
 
+impl NodeRecord {
+    /// Takes note of a step of the boot-up. A node that was never heard counts as
+    /// lost when its boot time is over.
+    pub(super) fn step(&mut self, status: NodeStatus) {
+        self.status = status;
+        if let (NodeStatus::Failed(failure), Presence::Unknown) = (status, self.presence)
+            && failure.cause == Cause::NoBootUp
+        {
+            self.presence = Presence::Missing;
+        }
+    }
+}
+
 /// Whether error control hears the node.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Presence {
     /// It was never heard.
     #[default]
     Unknown,
-    /// It was heard and is not any more.
+    /// It was heard and is not any more, or not in its boot time.
     Missing,
     /// What it last said.
     State(State),

@@ -88,6 +88,23 @@ fn the_nmt_state_is_what_error_control_says() {
 }
 
 #[test]
+fn a_node_never_seen_counts_as_lost_after_its_boot_time() {
+    let mut b = Bench::new();
+    let failure = |cause| Failure {
+        status: Status::B,
+        cause,
+    };
+    b.boot(Event::Failed(node(1), failure(Cause::Restarts)));
+    assert_eq!(b.number(0x1F82, 1), Ok(0));
+    b.boot(Event::Failed(node(1), failure(Cause::NoBootUp)));
+    assert_eq!(b.number(0x1F82, 1), Ok(1));
+    // What error control says goes before that.
+    b.device.on_node_state(node(1), Some(State::Stopped));
+    b.boot(Event::Failed(node(1), failure(Cause::NoBootUp)));
+    assert_eq!(b.number(0x1F82, 1), Ok(4));
+}
+
+#[test]
 fn the_emergencies_of_a_node() {
     let mut b = Bench::new();
     assert_eq!(b.text(0x2F02, 4), "no emergency");
