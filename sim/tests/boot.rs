@@ -274,6 +274,22 @@ fn after_bus_off_the_master_is_silent_and_boots_the_nodes_to_standby() {
 }
 
 #[test]
+fn coming_back_from_bus_off_is_told() {
+    let mut client = in_standby(62);
+    client.take_heard();
+    spoil(&mut client.world, SYNC);
+    client.listen(Time::from_ms(2500));
+    // 8140h: communication and generic.
+    let told = client.heard_from(0x0FF);
+    let recovered = |data: &Vec<u8>| data.starts_with(&[0x40, 0x81, 0x11]);
+    assert!(told.iter().any(recovered), "{told:02X?}");
+    let field: Vec<u32> = (1..=8)
+        .filter_map(|sub| client.number(0x1003, sub).ok())
+        .collect();
+    assert!(field.contains(&0x8140), "{field:08X?}");
+}
+
+#[test]
 fn bus_off_in_motion_ends_in_standby() {
     let mut world = moving(image(), 57).unwrap();
     spoil(&mut world, SYNC);
