@@ -32,11 +32,13 @@
 mod dictionary;
 mod error;
 mod index;
+mod lookup;
 mod node_record;
 mod pdo;
 mod settings;
 mod table;
 mod transfer;
+mod view;
 mod window;
 
 pub use error::MasterError;
@@ -55,8 +57,9 @@ use crate::sdo::{AbortCode, Server};
 use crate::sync::SyncLimits;
 use crate::time::{Duration, Instant, earliest};
 use crate::time_of_day::{self, TimeOfDay};
-use dictionary::{Dictionary, View};
+use dictionary::Dictionary;
 use node_record::Presence;
+use view::View;
 
 /// What the board is called.
 #[derive(Clone, Copy, Debug)]

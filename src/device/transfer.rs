@@ -2,8 +2,8 @@
 //! cable and node stand the full traffic before anything moves.
 
 use super::Board;
-use super::dictionary::View;
 use super::node_record::NodeRecord;
+use super::view::View;
 use crate::id::{Address, NodeId};
 use crate::sdo::{AbortCode, Protocol};
 

@@ -1,0 +1,244 @@
+//! The dictionary as the SDO server sees it: values of its entries, and what
+//! writing them does.
+
+use super::Board;
+use super::Event;
+use super::dictionary::Dictionary;
+use super::lookup::Found;
+use super::pdo::Mirrored;
+use super::settings::RESTORE_ALL;
+use super::table::Item;
+use super::window::{Window, concise_dcf};
+use crate::emcy::EmcyCobId;
+use crate::id::{Address, CobId, FunctionCode, NodeId};
+use crate::network;
+use crate::nmt::{Command, NodeControl, Target};
+use crate::od::{Chunk, Entry, ObjectDictionary, Value, read_bytes};
+use crate::pdo::Direction;
+use crate::sdo::AbortCode;
+use crate::time::Instant;
+use crate::time_of_day::TimeOfDay;
+
+/// Signatures of 1010h, 1011h and 1F25h, "save", "load" and "conf" from the
+/// least significant byte on.
+const SAVE: u32 = 0x6576_6173;
+const LOAD: u32 = 0x6461_6F6C;
+const CONFIGURE: u32 = 0x666E_6F63;
+/// Bit 31 of a COB-ID: there is none.
+const NOT_USED: u32 = 1 << 31;
+
+/// The dictionary in the hands of the SDO server, at a moment.
+pub(super) struct View<'a, B, const N: usize> {
+    pub(super) dictionary: &'a mut Dictionary<N>,
+    pub(super) board: &'a mut B,
+    pub(super) now: Instant,
+}
+
+impl<B: Board, const N: usize> View<'_, B, N> {
+    /// The bytes of a value of fixed size.
+    fn value(&mut self, found: &Found) -> Result<u64, AbortCode> {
+        let dictionary = &*self.dictionary;
+        let network = dictionary.network;
+        let known = found.node().and_then(|id| dictionary.node(id));
+        let record = known.map(|(_, record)| record);
+        let pdo = || Mirrored::find(network, found.at).ok_or(AbortCode::NO_SUCH_OBJECT);
+        let number: u32 = match found.item {
+            Item::Highest => found.sub.into(),
+            Item::Setting(setting) => dictionary.settings.get(setting),
+            Item::DeviceType => dictionary.description.device_type,
+            Item::ErrorRegister => dictionary.errors.register().0.into(),
+            Item::Status => dictionary.status,
+            Item::ErrorCount => dictionary.errors.field().len() as u32,
+            Item::ErrorField => *dictionary
+                .errors
+                .field()
+                .get(found.n())
+                .ok_or(AbortCode::NO_DATA)?,
+            // On command, not by itself.
+            Item::Save | Item::Restore => self.board.can_save().into(),
+            Item::Identity => {
+                let identity = &dictionary.description.identity;
+                match found.sub {
+                    1 => identity.vendor,
+                    2 => identity.product,
+                    3 => identity.revision,
+                    _ => identity.serial,
+                }
+            }
+            Item::EmcyConsumer => known.map_or(NOT_USED, |(n, _)| EmcyCobId::predefined(n.id).0),
+            Item::SdoServer => sdo_channel(found.sub, network.master.node),
+            Item::SdoClient | Item::SdoClientNode => {
+                let client = network.nodes.get(usize::from(found.place));
+                let node = client.ok_or(AbortCode::NO_SUCH_OBJECT)?.id;
+                match found.item {
+                    Item::SdoClient => sdo_channel(found.sub, node),
+                    _ => node.get().into(),
+                }
+            }
+            Item::PdoCobId => pdo()?.cob_id(),
+            Item::PdoTransmission => pdo()?.pdo.transmission.code().into(),
+            Item::PdoMapping => {
+                let entry = pdo()?.mapped(found.sub);
+                entry.ok_or(AbortCode::NO_SUCH_SUB_INDEX)?.0
+            }
+            Item::Zero => 0,
+            Item::NmtRequest if found.node() == Some(network.master.node) => {
+                dictionary.state.code().into()
+            }
+            Item::NmtRequest => record.map_or(0, |record| record.presence.code()).into(),
+            Item::Expected => {
+                let identity = known.map(|(node, _)| &node.identity);
+                let expected = identity.and_then(|identity| match found.place {
+                    0 => identity.device_type,
+                    1 => identity.vendor,
+                    2 => identity.product,
+                    3 => identity.revision,
+                    _ => identity.serial,
+                });
+                expected.unwrap_or(0)
+            }
+            Item::ConfiguredAt => known
+                .and_then(|(node, _)| node.configured.get(usize::from(found.place)))
+                .copied()
+                .unwrap_or(0),
+            Item::RestoreConfiguration => known.map_or(0, |_| RESTORE_ALL).into(),
+            Item::BootLetter => record.map_or(0, |record| record.status.letter()).into(),
+            Item::EmcyCount => record.map_or(0, |record| record.emcy.len() as u32),
+            Item::EmcyHistory => {
+                let emcy = record.and_then(|record| record.emcy.get(found.n()));
+                return Ok(u64::from_le_bytes(emcy.ok_or(AbortCode::NO_DATA)?.encode()));
+            }
+            Item::Clock => {
+                let time = dictionary.clock.time(self.now).ok_or(AbortCode::NO_DATA)?;
+                let [a, b, c, d, e, f] = time.encode();
+                return Ok(u64::from_le_bytes([a, b, c, d, e, f, 0, 0]));
+            }
+            Item::TransferTest => self.transfer_word(found.n()),
+            Item::Process => {
+                let process = dictionary.process(found).ok_or(AbortCode::NO_DATA)?;
+                let (node, pdo) = (process.node, process.number);
+                let data = match process.direction {
+                    Direction::Transmit => self.board.tpdo(node, pdo),
+                    Direction::Receive => self.board.rpdo(node, pdo),
+                };
+                return Ok(process.extract(data));
+            }
+            // Strings and domains are read piece by piece, 1F25h not at all.
+            Item::DeviceName
+            | Item::HardwareVersion
+            | Item::SoftwareVersion
+            | Item::ConciseDcf
+            | Item::BootWords
+            | Item::EmcyWords
+            | Item::Configure => return Err(AbortCode::UNSUPPORTED_ACCESS),
+        };
+        Ok(number.into())
+    }
+}
+
+/// The identifiers of a server: client to server, server to client
+/// (CiA 301, 7.5.2.33, 7.5.2.34).
+fn sdo_channel(sub: u8, server: NodeId) -> u32 {
+    let function = match sub {
+        1 => FunctionCode::SdoRequest,
+        _ => FunctionCode::SdoResponse,
+    };
+    CobId::of(function, server).get().into()
+}
+
+impl<B: Board, const N: usize> ObjectDictionary for View<'_, B, N> {
+    fn entry(&self, at: Address) -> Result<Entry, AbortCode> {
+        self.dictionary.entry(at)
+    }
+
+    /// The ranges of the settings are theirs to check.
+    fn in_range(&self, _: Address, _: Value) -> Result<(), AbortCode> {
+        Ok(())
+    }
+
+    fn get(&mut self, at: Address) -> Result<Value, AbortCode> {
+        let found = self.dictionary.find(at)?;
+        let value = self.value(&found)?;
+        Ok(Value::new(found.data_type, value as i64))
+    }
+
+    fn set(&mut self, at: Address, value: Value) -> Result<(), AbortCode> {
+        let dictionary = &mut *self.dictionary;
+        let number = value.as_u32();
+        let found = dictionary.find(at)?;
+        // 80h, all nodes, is not a node-ID.
+        let node = found.node();
+        let target = node.map_or(Target::All, Target::Node);
+        match found.item {
+            Item::Setting(setting) => return dictionary.change(setting, number),
+            // Only 0 can be written, which clears the field.
+            Item::ErrorCount | Item::EmcyCount if number != 0 => {
+                return Err(AbortCode::VALUE_RANGE);
+            }
+            Item::ErrorCount => dictionary.errors.clear_field(),
+            Item::EmcyCount => {
+                if let Some(record) = node.and_then(|node| dictionary.record(node)) {
+                    record.emcy.clear();
+                }
+            }
+            Item::Save => return dictionary.store(self.board, (number, SAVE), false),
+            Item::Restore => return dictionary.store(self.board, (number, LOAD), true),
+            Item::NmtRequest => return dictionary.request_nmt(self.board, node, number as u8),
+            Item::Configure if number != CONFIGURE => return Err(AbortCode::CANNOT_STORE),
+            Item::Configure => {
+                // It is configured whenever it boots.
+                let command = Command::ResetCommunication;
+                dictionary.may_request(self.board, NodeControl { command, target })?;
+                return dictionary.push(Event::Configure(target));
+            }
+            Item::TransferTest => return self.set_transfer_word(found.n(), number),
+            Item::Clock => {
+                let bytes = value.bytes().try_into().map_err(|_| AbortCode::GENERAL)?;
+                let time = TimeOfDay::decode(bytes).ok_or(AbortCode::VALUE_RANGE)?;
+                dictionary.clock.set(time, self.now);
+            }
+            _ => return Err(AbortCode::READ_ONLY),
+        }
+        Ok(())
+    }
+
+    fn read(&mut self, at: Address, offset: u32, buf: &mut [u8]) -> Result<Chunk, AbortCode> {
+        let dictionary = &*self.dictionary;
+        let found = dictionary.find(at)?;
+        let known = found.node().and_then(|id| dictionary.node(id));
+        let description = &dictionary.description;
+        let text = match found.item {
+            Item::DeviceName => description.name,
+            Item::HardwareVersion => description.hardware,
+            Item::SoftwareVersion => description.software,
+            Item::ConciseDcf | Item::BootWords | Item::EmcyWords => {
+                let mut window = Window::new(offset, buf);
+                match (found.item, known) {
+                    (Item::ConciseDcf, Some((node, _))) => {
+                        let network = dictionary.network;
+                        concise_dcf(|| network::plan(network, node), &mut window);
+                    }
+                    (Item::ConciseDcf, None) => return Err(AbortCode::NO_DATA),
+                    (_, None) => window.text("not in the network"),
+                    (Item::BootWords, Some((node, record))) => {
+                        window.text(node.name);
+                        window.text(": ");
+                        record.status.write(&mut window);
+                    }
+                    (_, Some((_, record))) => match record.emcy.get(0) {
+                        Some(emcy) => {
+                            window.hexadecimal(emcy.code.0);
+                            window.text("h (");
+                            window.text(emcy.code.text());
+                            window.text(")");
+                        }
+                        None => window.text("no emergency"),
+                    },
+                }
+                return Ok(window.chunk());
+            }
+            _ => return Err(AbortCode::UNSUPPORTED_ACCESS),
+        };
+        Ok(read_bytes(text.as_bytes(), offset, buf))
+    }
+}
