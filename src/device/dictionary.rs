@@ -2,6 +2,7 @@
 
 use super::node_record::{NodeRecord, NodeStatus};
 use super::settings::{Setting, Settings, nodes};
+use super::transfer::TransferTest;
 use super::{Board, Description, Event};
 use crate::emcy;
 use crate::id::NodeId;
@@ -29,8 +30,8 @@ pub(super) struct Dictionary<const N: usize> {
     pub(super) axes_enabled: bool,
     pub(super) clock: Clock,
     pub(super) nodes: [NodeRecord; N],
-    /// 2F12h:01 ..= 03
-    pub(super) transfer: [u32; 3],
+    /// 2F12h
+    pub(super) transfer: TransferTest,
     pub(super) events: Deque<Event, EVENTS>,
 }
 

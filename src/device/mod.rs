@@ -44,7 +44,7 @@ mod window;
 pub use error::MasterError;
 pub use node_record::NodeStatus;
 pub use settings::{Setting, Settings};
-pub use transfer::{TransferResult, TransferTest};
+pub use transfer::TransferTest;
 
 use crate::boot::{self, Startup};
 use crate::emcy::{self, Emcy, EmcyCode};
@@ -116,20 +116,6 @@ pub trait Board {
 
     /// The bytes of an RPDO of a node as it was last sent, zeros before.
     fn rpdo(&mut self, node: NodeId, number: u8) -> [u8; MAX_DATA];
-
-    /// Starts a transfer of test data, 2F12h:04. Called while no axis is
-    /// enabled.
-    ///
-    /// # Errors
-    /// 08000022h if one is under way; 06010000h unless implemented.
-    fn start_transfer(&mut self, _: TransferTest) -> Result<(), AbortCode> {
-        Err(AbortCode::UNSUPPORTED_ACCESS)
-    }
-
-    /// What the last one came to.
-    fn transfer_result(&self) -> TransferResult {
-        TransferResult::NONE
-    }
 }
 
 /// What a client caused, for the caller to carry out.
@@ -178,7 +164,7 @@ impl<const N: usize> Device<N> {
                 axes_enabled: false,
                 clock: time_of_day::Clock::new(),
                 nodes: core::array::from_fn(|_| Default::default()),
-                transfer: [0; 3],
+                transfer: TransferTest::NONE,
                 events: heapless::Deque::new(),
             },
             time: time_of_day::Producer::new(),
@@ -239,6 +225,11 @@ impl<const N: usize> Device<N> {
     /// While an axis is enabled nothing is saved.
     pub fn set_axes_enabled(&mut self, enabled: bool) {
         self.dictionary.axes_enabled = enabled;
+    }
+
+    /// 2F12h: what is to be transferred, if it is under way.
+    pub const fn transfer(&mut self) -> &mut TransferTest {
+        &mut self.dictionary.transfer
     }
 
     /// Takes note of a step of the boot-up: 2F00h, 2F01h.

@@ -1,9 +1,8 @@
 //! 2F12h: test data are transferred to or from a node by SDO, to see whether
 //! cable and node stand the full traffic before anything moves.
 
-use super::Board;
+use super::dictionary::Dictionary;
 use super::node_record::NodeRecord;
-use super::view::View;
 use crate::id::{Address, NodeId};
 use crate::sdo::{AbortCode, Protocol};
 
@@ -24,113 +23,103 @@ use crate::sdo::{AbortCode, Protocol};
 /// node-ID, with 08000022h while an axis is enabled, while the node
 /// is in its boot-up, and while another transfer is under way. Data that come
 /// wrong end an upload with 06090030h, too few or too many with 06070010h.
+///
+/// Whoever has the bus carries it out while it [is under
+/// way](TransferTest::is_under_way), and tells its [end](TransferTest::end).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TransferTest {
-    target: u32,
-    /// How many bytes.
-    pub size: u32,
-    /// Seed of the data.
-    pub seed: u32,
-    command: u8,
-}
+pub struct TransferTest([u32; WORDS]);
+
+const WORDS: usize = 7;
+/// Places in the record, counted from 0.
+const COMMAND: usize = 3;
+
+const SEGMENTED_DOWNLOAD: u32 = 1;
+const BLOCK_DOWNLOAD: u32 = 3;
+const BLOCK_UPLOAD: u32 = 4;
+
+/// The result of one that is under way.
+const UNDER_WAY: u32 = u32::MAX;
 
 impl TransferTest {
+    pub(super) const NONE: TransferTest = TransferTest([0, 0, 0, 0, 0, 0, AbortCode::NO_DATA.0]);
+
+    const fn target(&self) -> u32 {
+        self.0[0]
+    }
+
     /// Which entry of the node.
     pub const fn at(&self) -> Address {
-        let [_, sub, low, high] = self.target.to_le_bytes();
+        let [_, sub, low, high] = self.target().to_le_bytes();
         Address::new(u16::from_le_bytes([low, high]), sub)
     }
 
     /// Whose server; `None` for a number that is no node-ID.
     pub const fn node(&self) -> Option<NodeId> {
-        NodeId::new(self.target as u8)
+        NodeId::new(self.target() as u8)
+    }
+
+    /// How many bytes.
+    pub const fn size(&self) -> u32 {
+        self.0[1]
+    }
+
+    /// Seed of the data.
+    pub const fn seed(&self) -> u32 {
+        self.0[2]
     }
 
     /// From the node; else to it.
     pub const fn is_upload(&self) -> bool {
-        self.command & 1 == 0
+        self.0[COMMAND] & 1 == 0
     }
 
     /// In segments or in blocks.
     pub const fn protocol(&self) -> Protocol {
-        match self.command {
-            SEGMENTED_DOWNLOAD | SEGMENTED_UPLOAD => Protocol::Normal,
-            _ => Protocol::Block,
-        }
-    }
-}
-
-/// What a transfer came to: 2F12h:05 ..= 07.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TransferResult {
-    /// Bytes that were transferred.
-    pub bytes: u32,
-    /// How long it took, in microseconds.
-    pub us: u32,
-    /// 0: done.
-    pub code: u32,
-}
-
-impl TransferResult {
-    /// There was none yet.
-    pub const NONE: TransferResult = TransferResult {
-        bytes: 0,
-        us: 0,
-        code: AbortCode::NO_DATA.0,
-    };
-
-    /// The code of one that is under way.
-    pub const UNDER_WAY: u32 = u32::MAX;
-}
-
-/// Places in the record, counted from 0.
-const COMMAND: usize = 3;
-const BYTES: usize = 4;
-const MICROSECONDS: usize = 5;
-
-const SEGMENTED_DOWNLOAD: u8 = 1;
-const SEGMENTED_UPLOAD: u8 = 2;
-const BLOCK_UPLOAD: u8 = 4;
-
-impl<B: Board, const N: usize> View<'_, B, N> {
-    pub(super) fn transfer_word(&self, place: usize) -> u32 {
-        if let Some(word) = self.dictionary.transfer.get(place) {
-            return *word;
-        }
-        let result = self.board.transfer_result();
-        match place {
-            BYTES => result.bytes,
-            MICROSECONDS => result.us,
-            _ => result.code,
+        if self.0[COMMAND] < BLOCK_DOWNLOAD {
+            Protocol::Normal
+        } else {
+            Protocol::Block
         }
     }
 
+    /// It was started and has not ended.
+    pub const fn is_under_way(&self) -> bool {
+        self.0[WORDS - 1] == UNDER_WAY
+    }
+
+    /// It has ended after `us` microseconds and `bytes` bytes, with every one
+    /// transferred or with a code.
+    pub const fn end(&mut self, bytes: u32, us: u32, result: Result<(), AbortCode>) {
+        let code = match result {
+            Ok(()) => 0,
+            Err(code) => code.0,
+        };
+        let [target, size, seed, command, ..] = self.0;
+        self.0 = [target, size, seed, command, bytes, us, code];
+    }
+
+    /// The word at a place.
+    pub(super) fn word(&self, place: usize) -> u32 {
+        self.0.get(place).copied().unwrap_or(0)
+    }
+}
+
+impl<const N: usize> Dictionary<N> {
     pub(super) fn set_transfer_word(&mut self, place: usize, word: u32) -> Result<(), AbortCode> {
+        let test = &self.transfer;
         if place == COMMAND {
-            return self.start_transfer(word);
+            let exists = (SEGMENTED_DOWNLOAD..=BLOCK_UPLOAD).contains(&word);
+            let node = test.node().filter(|_| exists);
+            let node = node.ok_or(AbortCode::VALUE_RANGE)?;
+            let booting = |(_, record): (_, &NodeRecord)| record.status.is_in_boot_up();
+            if self.axes_enabled || test.is_under_way() || self.node(node).is_some_and(booting) {
+                return Err(AbortCode::DEVICE_STATE);
+            }
+            self.transfer.end(0, 0, Err(AbortCode(UNDER_WAY)));
         }
-        if let Some(old) = self.dictionary.transfer.get_mut(place) {
+        if let Some(old) = self.transfer.0.get_mut(place) {
             *old = word;
         }
         Ok(())
-    }
-
-    fn start_transfer(&mut self, command: u32) -> Result<(), AbortCode> {
-        let dictionary = &*self.dictionary;
-        let [target, size, seed] = dictionary.transfer;
-        let test = TransferTest {
-            target,
-            size,
-            seed,
-            command: command as u8,
-        };
-        let commands = SEGMENTED_DOWNLOAD.into()..=BLOCK_UPLOAD.into();
-        let node = test.node().filter(|_| commands.contains(&command));
-        let node = node.ok_or(AbortCode::VALUE_RANGE)?;
-        let booting = |(_, record): (_, &NodeRecord)| record.status.is_in_boot_up();
-        if dictionary.axes_enabled || dictionary.node(node).is_some_and(booting) {
-            return Err(AbortCode::DEVICE_STATE);
-        }
-        self.board.start_transfer(test)
     }
 }

@@ -113,7 +113,7 @@ impl<B: Board, const N: usize> View<'_, B, N> {
                 let [a, b, c, d, e, f] = time.encode();
                 return Ok(u64::from_le_bytes([a, b, c, d, e, f, 0, 0]));
             }
-            Item::TransferTest => self.transfer_word(found.n()),
+            Item::TransferTest => dictionary.transfer.word(found.n()),
             Item::Process => {
                 let process = dictionary.process(found).ok_or(AbortCode::NO_DATA)?;
                 let (node, pdo) = (process.node, process.number);
@@ -191,7 +191,7 @@ impl<B: Board, const N: usize> ObjectDictionary for View<'_, B, N> {
                 dictionary.may_request(self.board, NodeControl { command, target })?;
                 return dictionary.push(Event::Configure(target));
             }
-            Item::TransferTest => return self.set_transfer_word(found.n(), number),
+            Item::TransferTest => return dictionary.set_transfer_word(found.n(), number),
             Item::Clock => {
                 let bytes = value.bytes().try_into().map_err(|_| AbortCode::GENERAL)?;
                 let time = TimeOfDay::decode(bytes).ok_or(AbortCode::VALUE_RANGE)?;

@@ -7,7 +7,6 @@
 //! | 3 | `pdo_producer` | pended by the last TPDO, or TIM3 compare at the deadline |
 //! | 2 | `network` | TIM7, every millisecond |
 //! | 1 | `sdo_configurator` | woken by `can_irq` and `network` |
-//! | 1 | `sdo_transfer` | the same, once 2F12h is written |
 //! | 0 | `idle` | sleeps |
 //!
 //! | resource | ceiling | held for |
@@ -32,14 +31,13 @@ mod app {
         own_node::{Order, OwnNode, Storage},
         report::{publish, tell},
         roll::{self, Task},
-        transfer,
-        wake::{CONFIGURATOR, TRANSFER},
+        transfer, wake,
     };
     use canmaster::{
         Frame,
         boot::NetworkBoot,
         design::{self, AXES},
-        device::{MasterError, TransferTest},
+        device::MasterError,
         id::{CobId, FunctionCode},
         master::{
             self, AxisMap, Debounce, ExtendedClock, MasterOd, Put, Reception, Supervisor,
@@ -109,7 +107,6 @@ mod app {
         boot: &'static mut NetworkBoot<AXES>,
         answers: Consumer<'static, Frame>,
         transfer_answers: Consumer<'static, Frame>,
-        transfer_clock: timers::Microseconds,
         states: Consumer<'static, Frame>,
         news: Consumer<'static, News>,
         events: Consumer<'static, GroupEvent>,
@@ -211,7 +208,6 @@ mod app {
                 boot,
                 answers,
                 transfer_answers,
-                transfer_clock: board.microseconds,
                 states,
                 news,
                 events,
@@ -339,7 +335,6 @@ mod app {
         }
 
         let mut answered = false;
-        let mut transferred = false;
         while let Some(element) = can_rx
             .receive(can::Fifo::Fifo0)
             .or_else(|| can_rx.receive(can::Fifo::Fifo1))
@@ -367,27 +362,16 @@ mod app {
                 continue;
             };
             let to = match handler {
-                Handler::Answer if transfer::wants(frame.id()) => {
-                    transferred = true;
-                    &mut *transfer_to
-                }
-                Handler::Answer => {
-                    answered = true;
-                    &mut *answers_to
-                }
-                Handler::Request => {
-                    answered = true;
-                    &mut *requests_to
-                }
+                Handler::Answer if transfer::wants(frame.id()) => &mut *transfer_to,
+                Handler::Answer => &mut *answers_to,
+                Handler::Request => &mut *requests_to,
                 _ => &mut *to_network,
             };
+            answered |= matches!(handler, Handler::Answer | Handler::Request);
             queue(to, Some(frame));
         }
         if answered {
-            CONFIGURATOR.now();
-        }
-        if transferred {
-            TRANSFER.now();
+            wake::now();
         }
         roll::check_in(Task::CanIrq);
     }
@@ -450,7 +434,7 @@ mod app {
             if cx.local.events_to.enqueue(event).is_err() {
                 counters::LOG_FULL.count();
             }
-            CONFIGURATOR.want();
+            wake::want();
         }
     }
 
@@ -481,7 +465,7 @@ mod app {
         while let Some(frame) = local.from_can.dequeue() {
             if let Some((FunctionCode::ErrorControl, _)) = frame.id().split() {
                 queue(local.states_to, Some(frame));
-                CONFIGURATOR.want();
+                wake::want();
             }
             if let Some(report) = local.supervisor.on_frame(&frame, now) {
                 tell(report, local.news_to, &mut cx.shared.control);
@@ -542,8 +526,7 @@ mod app {
         }
         // Sends the heartbeat, and shows that it is alive.
         rtic::pend(Interrupt::FDCAN1_IT0);
-        CONFIGURATOR.if_due(counter);
-        transfer::tick(counter);
+        wake::if_due(counter);
         roll::check_in(Task::Network);
         if roll::complete() {
             local.watchdog.feed();
@@ -560,14 +543,14 @@ mod app {
     #[task(
         priority = 1,
         local = [
-            reset_cause, clock, boot, answers, states, news, events, own, requests, orders_to,
+            reset_cause, clock, boot, answers, transfer_answers, states, news, events, own, requests, orders_to,
             sync_period, store,
         ],
         shared = [od, can_tx, tx_queue, control, commands]
     )]
     async fn sdo_configurator(mut cx: sdo_configurator::Context) {
         let local = cx.local;
-        let mut wake = CONFIGURATOR.reader();
+        let mut wake = wake::reader();
         let mut log = Log::new(NETWORK);
         log::started(*local.reset_cause);
         let mut silent = Silent::default();
@@ -583,7 +566,15 @@ mod app {
             defmt::warn!("settings are not stored (1010h): set option bit DBANK, then flash again");
         }
         begin(own, local.sync_period, local.orders_to, &mut cx.shared);
+        let mut transfer = None;
         loop {
+            let tested = transfer::go_on(
+                &mut transfer,
+                own.device.transfer(),
+                local.transfer_answers,
+                &mut cx.shared.tx_queue,
+                now(*local.clock),
+            );
             while serve(
                 own,
                 boot,
@@ -646,29 +637,12 @@ mod app {
             let latest = now(*local.clock) + design::CONFIGURATOR_PERIOD;
             let boots = boot.next_deadline().filter(|_| !held);
             let mut next = latest;
-            for deadline in [boots, own.device.next_deadline()] {
+            for deadline in [boots, own.device.next_deadline(), tested] {
                 next = deadline.map_or(next, |deadline| deadline.min(next));
             }
-            CONFIGURATOR.at(next.as_micros() as u32);
+            wake::at(next.as_micros() as u32);
             wake.wait().await;
         }
-    }
-
-    /// Moves test data between the board and a node: 2F12h.
-    ///
-    /// Trigger: spawned where 2F12h is written, then the node's answers and
-    /// `network`. Budget: none. If it is starved, the data move slowly, or the node
-    /// gives up.
-    #[task(priority = 1, local = [transfer_answers, transfer_clock], shared = [tx_queue])]
-    async fn sdo_transfer(cx: sdo_transfer::Context, test: TransferTest) {
-        let bus = transfer::Bus {
-            answers: cx.local.transfer_answers,
-            clock: &CLOCK,
-            counter: *cx.local.transfer_clock,
-            tx_queue: cx.shared.tx_queue,
-            wake: TRANSFER.reader(),
-        };
-        transfer::run(test, bus).await
     }
 
     fn now(clock: timers::Microseconds) -> Instant {

@@ -8,15 +8,12 @@
 //! left, and one to all nodes waits until the axes, whose drives have heard it
 //! too, are off. Reset node and reset communication both start the board anew.
 
-use crate::{control::Control, log::News, transfer};
+use crate::{control::Control, log::News};
 use canmaster::{
     Frame, NodeId,
     boot::{Event, NetworkBoot},
     design::{self, AXES},
-    device::{
-        self, Description, Device, Identity, MasterError, Setting, Settings, TransferResult,
-        TransferTest,
-    },
+    device::{self, Description, Device, Identity, MasterError, Setting, Settings},
     emcy::EmcyCode,
     master::{self, MasterOd, Notice, TpdoSlot, WrongLength},
     motion::{AxisCommand, FaultCause, GroupEvent, GroupState},
@@ -124,14 +121,6 @@ where
             *byte = *sent;
         }
         bytes
-    }
-
-    fn start_transfer(&mut self, test: TransferTest) -> Result<(), AbortCode> {
-        transfer::start(test)
-    }
-
-    fn transfer_result(&self) -> TransferResult {
-        transfer::result()
     }
 }
 

@@ -1,6 +1,6 @@
 //! How `network` hands on what it has to say.
 
-use crate::{control::Control, counters, log::News, wake::CONFIGURATOR};
+use crate::{control::Control, counters, log::News, wake};
 use canmaster::master::Report;
 use heapless::spsc::Producer;
 
@@ -21,5 +21,5 @@ pub(crate) fn publish(to: &mut Producer<'static, News>, news: News) {
     if to.enqueue(news).is_err() {
         counters::LOG_FULL.count();
     }
-    CONFIGURATOR.want();
+    wake::want();
 }

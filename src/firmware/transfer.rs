@@ -1,24 +1,22 @@
 //! 2F12h: moves test data between the board and a node, as fast as it goes.
 //!
-//! The answers of that node come past the configurator meanwhile, so that it
-//! hears nothing from it. A node that boots again under the test is silent for
-//! the configurator until the test has failed, which it does within its timeout.
+//! The answers of that node come past the boot-up meanwhile, so that it hears
+//! nothing from it. A node that boots again under the test is silent for the
+//! boot-up until the test has failed, which it does within its timeout.
 
-use crate::{app::app::sdo_transfer, wake::TRANSFER};
 use canmaster::{
     Frame, NodeId,
     design::{self, TX_QUEUE},
-    device::{TransferResult, TransferTest},
+    device::TransferTest,
     id::CobId,
-    master::{ExtendedClock, TxQueue},
-    sdo::{AbortCode, AsyncClient, Channel, Link, TestData},
+    master::TxQueue,
+    sdo::{AbortCode, Channel, Course, Link, Session, TestData},
     time::{Duration, Instant},
 };
-use core::sync::atomic::{AtomicU16, AtomicU32, Ordering::Relaxed};
+use core::sync::atomic::{AtomicU16, Ordering::Relaxed};
 use heapless::spsc::Consumer;
-use nucleo_g474re::{pac::Interrupt, timers::Microseconds};
+use nucleo_g474re::pac::Interrupt;
 use rtic::Mutex;
-use rtic_sync::signal::SignalReader;
 
 /// How long the node may take for an answer; and after a failure everything that
 /// it may still have to say is waited for as long.
@@ -26,9 +24,6 @@ const TIMEOUT: Duration = Duration::from_millis(100);
 
 /// The identifier of the answers that are the test's; 0: none.
 static ANSWERS: AtomicU16 = AtomicU16::new(0);
-static BYTES: AtomicU32 = AtomicU32::new(0);
-static MICROSECONDS: AtomicU32 = AtomicU32::new(0);
-static CODE: AtomicU32 = AtomicU32::new(TransferResult::NONE.code);
 
 /// Whether the test wants the answers with this identifier.
 #[inline(always)]
@@ -36,49 +31,20 @@ pub(crate) fn wants(id: CobId) -> bool {
     id.get() == ANSWERS.load(Relaxed)
 }
 
-/// Lets time pass: to be called every millisecond.
-pub(crate) fn tick(now_us: u32) {
-    if ANSWERS.load(Relaxed) != 0 {
-        TRANSFER.if_due(now_us);
-    }
-}
-
-/// Starts a test, unless one is under way.
-pub(crate) fn start(test: TransferTest) -> Result<(), AbortCode> {
-    sdo_transfer::spawn(test).map_err(|_| AbortCode::DEVICE_STATE)?;
-    publish(0, 0, TransferResult::UNDER_WAY);
-    Ok(())
-}
-
-/// What the last one came to.
-pub(crate) fn result() -> TransferResult {
-    TransferResult {
-        bytes: BYTES.load(Relaxed),
-        us: MICROSECONDS.load(Relaxed),
-        code: CODE.load(Relaxed),
-    }
-}
-
-fn publish(bytes: u32, us: u32, code: u32) {
-    BYTES.store(bytes, Relaxed);
-    MICROSECONDS.store(us, Relaxed);
-    CODE.store(code, Relaxed);
-}
-
 /// The bus and the clock as the test has them.
-pub(crate) struct Bus<'a, T> {
-    pub(crate) answers: &'a mut Consumer<'static, Frame>,
-    pub(crate) clock: &'static ExtendedClock,
-    pub(crate) counter: Microseconds,
-    pub(crate) tx_queue: T,
-    pub(crate) wake: SignalReader<'static, ()>,
+struct Bus<'a, T> {
+    answers: &'a mut Consumer<'static, Frame>,
+    tx_queue: &'a mut T,
+    now: Instant,
 }
 
 impl<T: Mutex<T = TxQueue<TX_QUEUE>>> Link for Bus<'_, T> {
     fn now(&self) -> Instant {
-        self.clock.now(|| self.counter.now())
+        self.now
     }
 
+    /// Where there is no room, the queue is looked at again in the next
+    /// millisecond: it does not run empty before.
     fn send(&mut self, frame: Frame) -> bool {
         let sent = self
             .tx_queue
@@ -90,33 +56,63 @@ impl<T: Mutex<T = TxQueue<TX_QUEUE>>> Link for Bus<'_, T> {
     fn receive(&mut self) -> Option<Frame> {
         self.answers.dequeue()
     }
+}
 
-    /// Where there was no room, the queue is looked at again in the next
-    /// millisecond: it does not run empty before.
-    async fn wait(&mut self, until: Instant) {
-        TRANSFER.at(until.as_micros() as u32);
-        self.wake.wait().await;
+/// A test under way.
+pub(crate) struct Transfer {
+    channel: Channel,
+    session: Session,
+    data: TestData,
+    begun: Instant,
+}
+
+impl Transfer {
+    fn new(test: &TransferTest, now: Instant) -> Transfer {
+        // It was checked.
+        let node = test.node().unwrap_or(NodeId::MAX);
+        let channel = Channel::new(node, TIMEOUT);
+        ANSWERS.store(channel.response_id().get(), Relaxed);
+        let size = (!test.is_upload()).then_some(test.size());
+        Transfer {
+            channel,
+            session: Session::new(test.at(), size, test.protocol()),
+            data: TestData::new(test.seed()),
+            begun: now,
+        }
     }
 }
 
-/// Makes one test.
-pub(crate) async fn run<T: Mutex<T = TxQueue<TX_QUEUE>>>(test: TransferTest, mut bus: Bus<'_, T>) {
-    // It was checked.
-    let node = test.node().unwrap_or(NodeId::MAX);
-    let mut channel = Channel::new(node, TIMEOUT);
-    ANSWERS.store(channel.response_id().get(), Relaxed);
-    let begun = bus.counter.now();
-    let mut data = TestData::new(test.seed);
-    let size = (!test.is_upload()).then_some(test.size);
-    let done = AsyncClient::new(&mut channel, &mut bus)
-        .transfer(test.at(), size, test.protocol(), &mut data)
-        .await;
-    let us = bus.counter.now().wrapping_sub(begun);
-    let code = match done {
-        Ok(transfer) if transfer.len == test.size => 0,
-        Ok(_) => AbortCode::LENGTH_MISMATCH.0,
-        Err(error) => error.code().0,
+/// Goes on with the test if one is under way. `Some`: until when nothing is to be
+/// done unless an answer comes.
+pub(crate) fn go_on(
+    transfer: &mut Option<Transfer>,
+    test: &mut TransferTest,
+    answers: &mut Consumer<'static, Frame>,
+    tx_queue: &mut impl Mutex<T = TxQueue<TX_QUEUE>>,
+    now: Instant,
+) -> Option<Instant> {
+    if !test.is_under_way() {
+        return None;
+    }
+    let Transfer {
+        channel,
+        session,
+        data,
+        begun,
+    } = transfer.get_or_insert_with(|| Transfer::new(test, now));
+    let bus = &mut Bus {
+        answers,
+        tx_queue,
+        now,
     };
+    let result = match session.go_on(channel, bus, data) {
+        Course::Until(until) => return Some(until),
+        Course::Over(Ok(transfer)) if transfer.len == test.size() => Ok(()),
+        Course::Over(Ok(_)) => Err(AbortCode::LENGTH_MISMATCH),
+        Course::Over(Err(error)) => Err(error.code()),
+    };
+    test.end(data.reached(), (now - *begun).as_micros(), result);
+    *transfer = None;
     ANSWERS.store(0, Relaxed);
-    publish(data.reached(), us, code);
+    None
 }

@@ -1,35 +1,21 @@
 //! The client for async code: reading or writing an entry is one `await`.
 //!
-//! Beneath it is a [`Channel`], with all its rules. What async code has besides
-//! are a clock, a way to the bus, frames that come, and something to wait for: a
-//! [`Link`].
+//! Beneath it is a [`Session`] on a [`Channel`], with all its rules. What async
+//! code has besides a [`Link`] is something to wait for.
 
 use super::abort::AbortCode;
 use super::channel::{Channel, Payload, Protocol, Transfer};
 use super::error::SdoError;
 use super::progress::Progress;
 use super::response::Response;
-use crate::frame::Frame;
+use super::session::{Course, Link, Session};
 use crate::id::Address;
 use crate::time::Instant;
-use core::pin::{Pin, pin};
-use core::task::{Context, Poll};
 
-/// The way to the bus and the clock.
-pub trait Link {
-    /// The present moment.
-    fn now(&self) -> Instant;
-
-    /// Hands a frame on to be sent; `false` if there is no room for it now.
-    fn send(&mut self, frame: Frame) -> bool;
-
-    /// The next frame that was received. Frames that are not the node's may be
-    /// among them.
-    fn receive(&mut self) -> Option<Frame>;
-
+/// A link that can be waited on.
+pub trait AsyncLink: Link {
     /// Waits until a frame may have come, or until a moment. If that is past,
-    /// until there may be room for a frame to be sent. The future may be dropped
-    /// before its end and another be asked for.
+    /// until there may be room for a frame to be sent.
     fn wait(&mut self, until: Instant) -> impl Future<Output = ()>;
 }
 
@@ -59,7 +45,7 @@ impl Payload for Bytes<'_> {
     }
 }
 
-impl<'a, L: Link> AsyncClient<'a, L> {
+impl<'a, L: AsyncLink> AsyncClient<'a, L> {
     /// A client on a channel.
     pub const fn new(channel: &'a mut Channel, link: &'a mut L) -> AsyncClient<'a, L> {
         AsyncClient { channel, link }
@@ -94,99 +80,22 @@ impl<'a, L: Link> AsyncClient<'a, L> {
     /// # Errors
     /// Why it failed, told when the channel is open again: after a timeout or a
     /// violation of the protocol, at the end of the quarantine.
-    pub fn transfer<'b>(
-        &'b mut self,
+    pub async fn transfer(
+        &mut self,
         at: Address,
         size: Option<u32>,
         protocol: Protocol,
-        payload: &'b mut dyn Payload,
-    ) -> Transferring<'b, L> {
-        let cancelled = self.channel.cancel(AbortCode::GENERAL, self.link.now());
-        Transferring {
-            channel: self.channel,
-            link: self.link,
-            payload,
-            at,
-            size,
-            protocol,
-            unsent: match cancelled {
-                Progress::Failed(_, abort) => abort,
-                _ => None,
-            },
-            over: None,
-        }
-    }
-}
-
-/// A transfer under way: to be awaited.
-///
-/// Written by hand, since the state that the compiler makes of an async function
-/// takes twice the code.
-#[must_use = "nothing happens unless it is awaited"]
-pub struct Transferring<'a, L> {
-    channel: &'a mut Channel,
-    link: &'a mut L,
-    payload: &'a mut dyn Payload,
-    at: Address,
-    size: Option<u32>,
-    protocol: Protocol,
-    unsent: Option<Frame>,
-    over: Option<Result<Transfer, SdoError>>,
-}
-
-impl<L: Link> Future for Transferring<'_, L> {
-    type Output = Result<Transfer, SdoError>;
-
-    fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Self::Output> {
-        let this = self.get_mut();
+        payload: &mut dyn Payload,
+    ) -> Result<Transfer, SdoError> {
+        let abort = match self.channel.cancel(AbortCode::GENERAL, self.link.now()) {
+            Progress::Failed(_, abort) => abort,
+            _ => None,
+        };
+        let mut session = Session::new(at, size, protocol).after(abort);
         loop {
-            let until = match this.go_on() {
-                Ok(over) => return Poll::Ready(over),
-                Err(until) => until,
-            };
-            if pin!(this.link.wait(until)).poll(context).is_pending() {
-                return Poll::Pending;
-            }
-        }
-    }
-}
-
-impl<L: Link> Transferring<'_, L> {
-    /// Does everything that can be done now. The end, or until when to wait.
-    fn go_on(&mut self) -> Result<Result<Transfer, SdoError>, Instant> {
-        loop {
-            let now = self.link.now();
-            if let Some(frame) = self.unsent {
-                if !self.link.send(frame) {
-                    return Err(now);
-                }
-                self.unsent = None;
-            }
-            let progress = if let Some(frame) = self.link.receive() {
-                self.channel.on_frame(&frame, now, self.payload)
-            } else if !self.channel.is_ready(now) {
-                match self.channel.poll(now, self.payload) {
-                    Progress::Nothing => return Err(self.channel.next_deadline().unwrap_or(now)),
-                    progress => progress,
-                }
-            } else if let Some(over) = self.over.take() {
-                return Ok(over);
-            } else {
-                let (at, protocol) = (self.at, self.protocol);
-                let begun = match self.size {
-                    Some(size) => self.channel.download(at, size, protocol, self.payload, now),
-                    None => self.channel.upload(at, protocol, now),
-                };
-                begun.map_or(Progress::Nothing, Progress::Send)
-            };
-            match progress {
-                Progress::Nothing => {}
-                Progress::Send(frame) => self.unsent = Some(frame),
-                Progress::Done(transfer) => self.over = Some(Ok(transfer)),
-                Progress::Failed(error, abort) => {
-                    self.unsent = abort;
-                    self.over = Some(Err(error));
-                }
+            match session.go_on(self.channel, self.link, payload) {
+                Course::Over(over) => return over,
+                Course::Until(until) => self.link.wait(until).await,
             }
         }
     }

@@ -1,9 +1,7 @@
 //! A device on the bench: a client's frames go in, answers come out.
 
 use canmaster::boot::Event as Step;
-use canmaster::device::{
-    Board, Description, Device, Event, Identity, TransferResult, TransferTest,
-};
+use canmaster::device::{Board, Description, Device, Event, Identity};
 use canmaster::network::sample::SIX_EPOS4;
 use canmaster::nmt::{NodeControl, State};
 use canmaster::sdo::AbortCode;
@@ -44,7 +42,6 @@ pub(crate) struct Fake {
     pub(crate) refuses: Option<AbortCode>,
     pub(crate) refuses_requests: Option<AbortCode>,
     pub(crate) can_save: bool,
-    pub(crate) transfer: Option<TransferTest>,
 }
 
 impl Board for Fake {
@@ -72,25 +69,6 @@ impl Board for Fake {
 
     fn rpdo(&mut self, node: NodeId, number: u8) -> [u8; 8] {
         [node.get(), number, 0x21, 0x22, 0x23, 0x24, 0x25, 0x26]
-    }
-
-    fn start_transfer(&mut self, test: TransferTest) -> Result<(), AbortCode> {
-        if self.transfer.is_some() {
-            return Err(AbortCode::DEVICE_STATE);
-        }
-        self.transfer = Some(test);
-        Ok(())
-    }
-
-    fn transfer_result(&self) -> TransferResult {
-        let Some(test) = self.transfer else {
-            return TransferResult::NONE;
-        };
-        TransferResult {
-            bytes: test.size / 2,
-            us: 1000,
-            code: TransferResult::UNDER_WAY,
-        }
     }
 }
 

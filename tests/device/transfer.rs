@@ -32,10 +32,11 @@ fn what_is_written_is_started() {
     ] {
         let mut b = described();
         assert_eq!(start(&mut b, command), Ok(()));
-        let test = b.board.transfer.unwrap();
+        let test = *b.device.transfer();
+        assert!(test.is_under_way());
         assert_eq!(test.node(), Some(node(3)));
         assert_eq!(test.at(), Address::new(0x2FF0, 5));
-        assert_eq!((test.size, test.seed), (100_000, 0xDEAD_BEEF));
+        assert_eq!((test.size(), test.seed()), (100_000, 0xDEAD_BEEF));
         assert_eq!((test.is_upload(), test.protocol()), (upload, protocol));
     }
 }
@@ -48,9 +49,17 @@ fn what_it_comes_to_is_read() {
     assert_eq!(b.number(TEST, 4), Err(AbortCode::WRITE_ONLY));
     assert_eq!(b.number(TEST, 7), Ok(0x0800_0024), "there was none");
     start(&mut b, 1).unwrap();
+    assert_eq!(b.number(TEST, 5), Ok(0));
+    assert_eq!(b.number(TEST, 7), Ok(0xFFFF_FFFF), "under way");
+    b.device.transfer().end(50_000, 1000, Err(AbortCode::CRC));
     assert_eq!(b.number(TEST, 5), Ok(50_000));
     assert_eq!(b.number(TEST, 6), Ok(1000));
-    assert_eq!(b.number(TEST, 7), Ok(0xFFFF_FFFF), "under way");
+    assert_eq!(b.number(TEST, 7), Ok(0x0504_0004));
+    start(&mut b, 2).unwrap();
+    assert_eq!(b.number(TEST, 5), Ok(0), "anew");
+    b.device.transfer().end(100_000, 2000, Ok(()));
+    assert_eq!(b.number(TEST, 7), Ok(0));
+    assert_eq!(b.number(TEST, 2), Ok(100_000));
     assert_eq!(b.number(TEST, 8), Err(AbortCode::NO_SUCH_SUB_INDEX));
 }
 
@@ -64,7 +73,7 @@ fn nonsense_is_refused() {
         b.write(TEST, 1, &target.to_le_bytes()).unwrap();
         assert_eq!(start(&mut b, 1), Err(AbortCode::VALUE_RANGE));
     }
-    assert_eq!(b.board.transfer, None);
+    assert!(!b.device.transfer().is_under_way());
 }
 
 #[test]

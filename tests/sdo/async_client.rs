@@ -7,7 +7,8 @@ use std::task::{Context, Poll, Waker};
 use crate::common::{DOMAIN, Dictionary, Memory, NODE, TIMEOUT, ms};
 use canmaster::id::Address;
 use canmaster::sdo::{
-    AbortCode, AsyncClient, Channel, Link, Protocol, SdoError, Server, TestData, Transfer,
+    AbortCode, AsyncClient, AsyncLink, Channel, Link, Protocol, SdoError, Server, TestData,
+    Transfer,
 };
 use canmaster::time::{Duration, Instant};
 use canmaster::{CobId, Frame};
@@ -67,7 +68,9 @@ impl Link for Wire {
     fn receive(&mut self) -> Option<Frame> {
         self.coming.pop_front()
     }
+}
 
+impl AsyncLink for Wire {
     async fn wait(&mut self, until: Instant) {
         self.now += LATENCY;
         while let Some(frame) = self.server.poll(self.now, &mut self.od) {
