@@ -8,10 +8,10 @@ use canmaster::{
     boot::Event,
     master::{Notice, Report},
     motion::{FaultCause, GroupEvent, GroupState},
-    network::Network,
+    network::{Network, Node},
 };
 use core::sync::atomic::{AtomicU32, Ordering};
-use defmt::{error, info, warn};
+use defmt::{Format, info};
 use nucleo_g474re::{can::ErrorState, reset_cause::ResetCause};
 
 /// Milliseconds since the start, for the log; `network` counts them.
@@ -19,15 +19,78 @@ pub(crate) static UPTIME_MS: AtomicU32 = AtomicU32::new(0);
 
 defmt::timestamp!("{=u32:ms}", UPTIME_MS.load(Ordering::Relaxed));
 
-/// The first fault is an error, what follows from it a warning.
-macro_rules! fault {
-    ($log:expr, $($words:tt)+) => {
-        if core::mem::replace(&mut $log.faulted, true) {
-            warn!($($words)+);
-        } else {
-            error!($($words)+);
+/// How much a line matters.
+#[derive(Clone, Copy)]
+enum Level {
+    Debug,
+    Info,
+    Warning,
+    Error,
+}
+
+/// A line of the log. Each kind is formatted in one place for all levels.
+#[derive(Clone, Copy)]
+enum Line<'a> {
+    Words(defmt::Str),
+    Counts(&'a Counts),
+    Boot(&'a Event),
+    Notice(&'a Notice),
+    /// Of a node that the network does not name.
+    Foreign(&'a Notice),
+    /// With what to do about it.
+    Advised(&'a Notice),
+    Group(&'a GroupEvent),
+    Standby(&'a GroupEvent),
+    Faulted(&'a GroupEvent),
+    AxisFault(&'a Node, &'a FaultCause),
+}
+
+impl defmt::Format for Line<'_> {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        match *self {
+            Line::Words(words) => defmt::write!(f, "{=istr}", words),
+            Line::Counts(counts) => defmt::write!(
+                f,
+                "so far: {=u32} SYNC not sent, {=u32} RPDO sent late or not, {=u32} cycles overrun, {=u32} frames not queued, {=u32} receive overruns, {=u32} receive queue full, {=u32} TPDO too short, {=u32} log lines lost",
+                counts.sync_not_sent,
+                counts.rpdo_replaced,
+                counts.cycle_overruns,
+                counts.tx_overflows,
+                counts.rx_overruns,
+                counts.rx_queue_full,
+                counts.tpdo_length,
+                counts.log_full,
+            ),
+            Line::Boot(event) => event.format(f),
+            Line::Notice(notice) => notice.format(f),
+            Line::Foreign(notice) => {
+                defmt::write!(f, "{}: it is not in the network description", *notice);
+            }
+            Line::Advised(notice) => defmt::write!(f, "{}; {}", *notice, notice.advice()),
+            Line::Group(event) => event.format(f),
+            Line::Standby(event) => {
+                defmt::write!(f, "{}: press B1 to start the motion", *event);
+            }
+            Line::Faulted(event) => defmt::write!(
+                f,
+                "{}: a lost node is booted again by itself, else reset the node (1F82h) or the board",
+                *event
+            ),
+            Line::AxisFault(node, cause) => {
+                defmt::write!(f, "node {} ({=str}): {}", node.id, node.name, *cause);
+            }
         }
-    };
+    }
+}
+
+#[inline(never)]
+fn write(level: Level, line: Line<'_>) {
+    match level {
+        Level::Debug => defmt::debug!("{}", line),
+        Level::Info => defmt::info!("{}", line),
+        Level::Warning => defmt::warn!("{}", line),
+        Level::Error => defmt::error!("{}", line),
+    }
 }
 
 /// The first line.
@@ -87,107 +150,103 @@ impl Log {
         }
     }
 
+    /// The first fault is an error, what follows from it a warning.
+    fn fault(&mut self) -> Level {
+        match core::mem::replace(&mut self.faulted, true) {
+            true => Level::Warning,
+            false => Level::Error,
+        }
+    }
+
     /// A step of the boot-up.
     pub(crate) fn boot(&mut self, event: &Event) {
-        match event {
-            Event::Failed(..) => error!("{}", event),
+        let level = match event {
+            Event::Failed(..) => Level::Error,
             Event::NetworkFailed
             | Event::IdGiven { stored: false, .. }
             | Event::IdRefused { .. }
             | Event::IdUnanswered(_)
-            | Event::Stranger(_) => warn!("{}", event),
-            Event::Configuring { .. } => defmt::debug!("{}", event),
-            _ => info!("{}", event),
-        }
+            | Event::Stranger(_) => Level::Warning,
+            Event::Configuring { .. } => Level::Debug,
+            _ => Level::Info,
+        };
+        write(level, Line::Boot(event));
     }
 
     /// What `network` had to say.
     pub(crate) fn news(&mut self, news: &News) {
-        match news {
-            News::Node(report) => self.report(report),
-            News::ErrorState(ErrorState::BusOff) => fault!(
-                self,
-                "CAN controller bus-off: check CAN_H and CAN_L for a short or exchanged wires, the termination, and the bit rate of every node"
+        let (level, words) = match news {
+            News::Node(report) => return self.report(report),
+            News::Counts(counts) => return write(Level::Warning, Line::Counts(counts)),
+            News::ErrorState(ErrorState::BusOff) => (
+                self.fault(),
+                defmt::intern!(
+                    "CAN controller bus-off: check CAN_H and CAN_L for a short or exchanged wires, the termination, and the bit rate of every node"
+                ),
             ),
-            News::ErrorState(ErrorState::Passive) => {
-                warn!(
+            News::ErrorState(ErrorState::Passive) => (
+                Level::Warning,
+                defmt::intern!(
                     "CAN controller error passive: is any other node on the bus, and the bus terminated?"
-                );
-            }
-            News::ErrorState(ErrorState::Warning) => {
-                warn!("CAN error counter at the warning limit: check wiring and termination");
-            }
-            News::ErrorState(ErrorState::Active) => info!("CAN controller error active again"),
-            News::Counts(counts) => warn!(
-                "so far: {=u32} SYNC not sent, {=u32} RPDO sent late or not, {=u32} cycles overrun, {=u32} frames not queued, {=u32} receive overruns, {=u32} receive queue full, {=u32} TPDO too short, {=u32} log lines lost",
-                counts.sync_not_sent,
-                counts.rpdo_replaced,
-                counts.cycle_overruns,
-                counts.tx_overflows,
-                counts.rx_overruns,
-                counts.rx_queue_full,
-                counts.tpdo_length,
-                counts.log_full,
+                ),
             ),
-        }
+            News::ErrorState(ErrorState::Warning) => (
+                Level::Warning,
+                defmt::intern!(
+                    "CAN error counter at the warning limit: check wiring and termination"
+                ),
+            ),
+            News::ErrorState(ErrorState::Active) => (
+                Level::Info,
+                defmt::intern!("CAN controller error active again"),
+            ),
+        };
+        write(level, Line::Words(words));
     }
 
     fn report(&mut self, report: &Report) {
-        let Report {
-            axis,
-            notice,
-            fault,
-        } = report;
-        if axis.is_none() {
-            warn!("{}: it is not in the network description", notice);
-        } else if fault.is_some() {
-            fault!(self, "{}; {}", notice, notice.advice());
+        let notice = &report.notice;
+        let (level, line) = if report.axis.is_none() {
+            (Level::Warning, Line::Foreign(notice))
+        } else if report.fault.is_some() {
+            (self.fault(), Line::Advised(notice))
         } else {
-            warn!("{}", notice);
-        }
+            (Level::Warning, Line::Notice(notice))
+        };
+        write(level, line);
     }
 
     /// What the group reports.
     pub(crate) fn group(&mut self, event: &GroupEvent) {
-        match event {
+        let (level, line) = match event {
             // The controller's state says more.
             GroupEvent::Fault {
                 cause: FaultCause::NetworkLost,
                 ..
-            } => {
-                warn!("{}", event);
+            } => (Level::Warning, Line::Group(event)),
+            GroupEvent::Fault { axis, cause } => {
+                let axis = axis.map(usize::from);
+                let node = axis.and_then(|axis| self.network.nodes.get(axis));
+                let line = node.map_or(Line::Group(event), |node| Line::AxisFault(node, cause));
+                (self.fault(), line)
             }
-            GroupEvent::Fault {
-                axis: Some(axis),
-                cause,
-            } => match self.network.nodes.get(usize::from(*axis)) {
-                Some(node) => {
-                    fault!(self, "node {} ({=str}): {}", node.id, node.name, cause);
-                }
-                None => fault!(self, "{}", event),
-            },
-            GroupEvent::Fault { .. } => fault!(self, "{}", event),
             GroupEvent::State {
                 to: GroupState::Standby,
                 ..
             } => {
                 self.faulted = false;
-                info!("{}: press B1 to start the motion", event);
+                (Level::Info, Line::Standby(event))
             }
             GroupEvent::State {
                 to: GroupState::Faulted,
                 ..
-            } => {
-                warn!(
-                    "{}: a lost node is booted again by itself, else reset the node (1F82h) or the board",
-                    event
-                );
-            }
+            } => (Level::Warning, Line::Faulted(event)),
             GroupEvent::ReleaseRefused(_)
             | GroupEvent::Coasting { .. }
             | GroupEvent::NotAtRest { .. }
-            | GroupEvent::Lost { .. } => warn!("{}", event),
-            _ => info!("{}", event),
-        }
+            | GroupEvent::Lost { .. } => (Level::Warning, Line::Group(event)),
+            _ => (Level::Info, Line::Group(event)),
+        };
+        write(level, line);
     }
 }
