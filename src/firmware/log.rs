@@ -11,7 +11,7 @@ use canmaster::{
     network::{Network, Node},
 };
 use core::sync::atomic::{AtomicU32, Ordering};
-use defmt::{Format, info};
+use defmt::info;
 use nucleo_g474re::{can::ErrorState, reset_cause::ResetCause};
 
 /// Milliseconds since the start, for the log; `network` counts them.

@@ -1,7 +1,7 @@
 //! One axis inside a group: its bookkeeping from cycle to cycle.
 
 use super::config::{AxisConfig, GroupConfig};
-use super::{AxisCommand, AxisFeedback};
+use super::{AxisCommand, AxisFeedback, FaultCause};
 use crate::cia402::{self, Command, ControlWord, State, StatusWord};
 use crate::motion::position_control::{PositionControl, Window};
 use crate::motion::profile::Setpoint;
@@ -13,6 +13,10 @@ use crate::time::Instant;
 const HUNDRED: f32 = 100.0;
 
 pub(super) struct Axis {
+    /// Its place in the group.
+    pub(super) n: u8,
+    /// What its drive reported in this cycle.
+    pub(super) feedback: AxisFeedback,
     pub(super) config: &'static AxisConfig,
     pub(super) scale: Scale,
     pub(super) machine: cia402::Axis,
@@ -45,11 +49,14 @@ pub(super) struct Axis {
 
 impl Axis {
     pub(super) fn new<const N: usize>(
+        n: u8,
         config: &'static AxisConfig,
         group: &'static GroupConfig<N>,
     ) -> Axis {
         let scale = Scale::new(config.increments_per_turn, group.cycle);
         Axis {
+            n,
+            feedback: AxisFeedback::default(),
             config,
             scale,
             machine: cia402::Axis::new(group.enable_timeout),
@@ -73,8 +80,8 @@ impl Axis {
     }
 
     /// Forgets what was heard and what went wrong, before enabling.
-    pub(super) fn restart(&mut self, absent: bool) {
-        self.absent = absent;
+    pub(super) fn restart(&mut self, absent: u32) {
+        self.absent = self.is_in(absent);
         self.status = None;
         self.missing = 0;
         self.faulted = false;
@@ -84,9 +91,16 @@ impl Axis {
         self.velocity = 0;
     }
 
+    /// Whether a set of axes, bit n for axis n, holds it.
+    pub(super) fn is_in(&self, axes: u32) -> bool {
+        let bits = axes.checked_shr(self.n.into()).unwrap_or(0);
+        bits & 1 != 0
+    }
+
     /// Takes in this cycle's feedback; returns the state if it is another one
     /// than last reported.
     pub(super) fn hear(&mut self, feedback: &AxisFeedback) -> Option<State> {
+        self.feedback = *feedback;
         if !feedback.fresh {
             self.missing = self.missing.saturating_add(1);
             return None;
@@ -106,8 +120,8 @@ impl Axis {
     }
 
     /// Reference minus actual position at the SYNC just passed.
-    pub(super) fn error(&self, t: i32, position: i32) -> i32 {
-        self.reference.at(t - 1).minus(position) as i32
+    pub(super) fn error(&self, t: i32) -> i32 {
+        self.reference.at(t - 1).minus(self.feedback.position) as i32
     }
 
     /// Sets what to follow from the next SYNC on, and the drive's ramps for it.
@@ -136,17 +150,37 @@ impl Axis {
         u32::try_from(t - 1).is_ok_and(|t| t >= self.reference.duration().saturating_add(cycles))
     }
 
+    /// Whether it has come to rest since its reference ended, `on_target` or
+    /// wherever it is; then with its error. An error if that takes too long.
+    pub(super) fn comes_to_rest<const N: usize>(
+        &mut self,
+        t: i32,
+        on_target: bool,
+        group: &GroupConfig<N>,
+    ) -> Result<Option<i32>, FaultCause> {
+        if !self.ended(t, 0) {
+            return Ok(None);
+        }
+        let error = self.error(t);
+        if self.settle(on_target.then_some(error), group) {
+            return Ok(Some(error));
+        }
+        if self.ended(t, group.cycles(group.settle_timeout)) {
+            return Err(FaultCause::NotArrived { error });
+        }
+        Ok(None)
+    }
+
     /// Counts cycles at rest, within `error` if one is given, and says whether
     /// they are enough.
     pub(super) fn settle<const N: usize>(
         &mut self,
-        feedback: &AxisFeedback,
         error: Option<i32>,
         group: &GroupConfig<N>,
     ) -> bool {
-        if feedback.fresh {
+        if self.feedback.fresh {
             let near = error.is_none_or(|e| e.unsigned_abs() <= self.config.in_position);
-            let at_rest = feedback.velocity.unsigned_abs() <= group.standstill_rpm;
+            let at_rest = self.feedback.velocity.unsigned_abs() <= group.standstill_rpm;
             self.settled = if near && at_rest {
                 self.settled.saturating_add(1)
             } else {
@@ -183,29 +217,24 @@ impl Axis {
     }
 
     /// As the state machine says, target 0.
-    pub(super) fn command_rest(&mut self, now: Instant, feedback: &AxisFeedback) -> AxisCommand {
+    pub(super) fn command_rest(&mut self, now: Instant) -> AxisCommand {
         self.velocity = 0;
-        let word = self.machine.step(now, fresh_status(feedback));
+        let word = self.machine.step(now, self.fresh_status());
         self.command(word)
     }
 
     /// Along the reference.
-    pub(super) fn command_follow(
-        &mut self,
-        now: Instant,
-        t: i32,
-        feedback: &AxisFeedback,
-    ) -> AxisCommand {
+    pub(super) fn command_follow(&mut self, now: Instant, t: i32) -> AxisCommand {
         let window = Window {
             now: self.reference.at(t - 1),
             ahead: self.reference.at(t + 1),
             beyond: self.reference.at(t + 2).velocity,
         };
-        let position = feedback.fresh.then_some(feedback.position);
+        let position = self.feedback.fresh.then_some(self.feedback.position);
         self.velocity = self
             .control
             .step(&window, position, self.config.velocity_max);
-        let word = self.machine.step(now, fresh_status(feedback));
+        let word = self.machine.step(now, self.fresh_status());
         self.command(word)
     }
 
@@ -235,6 +264,13 @@ impl Axis {
         self.command(ControlWord::new(Command::EnableOperation))
     }
 
+    fn fresh_status(&self) -> Option<StatusWord> {
+        let AxisFeedback {
+            fresh, statusword, ..
+        } = self.feedback;
+        fresh.then_some(StatusWord(statusword))
+    }
+
     fn command(&self, word: ControlWord) -> AxisCommand {
         AxisCommand {
             controlword: word.0,
@@ -243,8 +279,4 @@ impl Axis {
             deceleration: self.deceleration,
         }
     }
-}
-
-fn fresh_status(feedback: &AxisFeedback) -> Option<StatusWord> {
-    feedback.fresh.then_some(StatusWord(feedback.statusword))
 }

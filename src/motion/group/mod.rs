@@ -111,8 +111,22 @@ pub struct Group<const N: usize> {
     /// The axes left out since the group began to enable.
     absent: u32,
     program: Result<(), PlanError>,
-    events: Deque<GroupEvent, EVENTS>,
+    events: Events,
+}
+
+/// Events that were not taken yet, and how many found no room.
+struct Events {
+    queue: Deque<GroupEvent, EVENTS>,
     lost: u16,
+}
+
+impl Events {
+    #[inline(never)]
+    fn report(&mut self, event: GroupEvent) {
+        if self.queue.push_back(event).is_err() {
+            self.lost = self.lost.saturating_add(1);
+        }
+    }
 }
 
 impl<const N: usize> Group<N> {
@@ -135,9 +149,9 @@ impl<const N: usize> Group<N> {
     }
 
     fn add_axes(&mut self) {
-        for axis in &self.config.axes {
+        for (n, axis) in (0..).zip(&self.config.axes) {
             // There is room: both are `N`.
-            let _ = self.axes.push(Axis::new(axis, self.config));
+            let _ = self.axes.push(Axis::new(n, axis, self.config));
         }
     }
 
@@ -154,8 +168,10 @@ impl<const N: usize> Group<N> {
             network_was_down: false,
             absent: 0,
             program: config.program.duration(config).map(|_| ()),
-            events: Deque::new(),
-            lost: 0,
+            events: Events {
+                queue: Deque::new(),
+                lost: 0,
+            },
         }
     }
 
@@ -166,8 +182,8 @@ impl<const N: usize> Group<N> {
 
     /// The oldest event that was not taken yet. Take all after every step.
     pub fn take_event(&mut self) -> Option<GroupEvent> {
-        self.events.pop_front().or_else(|| {
-            let count = core::mem::take(&mut self.lost);
+        self.events.queue.pop_front().or_else(|| {
+            let count = core::mem::take(&mut self.events.lost);
             (count > 0).then_some(GroupEvent::Lost { count })
         })
     }
@@ -182,20 +198,21 @@ impl<const N: usize> Group<N> {
     ) {
         self.now += self.config.cycle;
         self.t = (self.t + 1).min(LONGEST_T);
-        for n in 0..N {
-            self.hear(n, feedback);
+        for (axis, feedback) in self.axes.iter_mut().zip(feedback) {
+            if let Some(state) = axis.hear(feedback) {
+                let axis = axis.n;
+                self.events.report(GroupEvent::AxisState { axis, state });
+            }
         }
-        self.watch(&request, feedback);
-        self.obey(&request, feedback);
-        self.advance(feedback);
-        for ((axis, feedback), out) in self.axes.iter_mut().zip(feedback).zip(out) {
+        self.watch(&request);
+        self.obey(&request);
+        self.advance();
+        for (axis, out) in self.axes.iter_mut().zip(out) {
             *out = match self.state {
                 _ if axis.absent => axis.command_off(),
                 GroupState::Idle | GroupState::Faulted => axis.command_off(),
-                GroupState::Enabling | GroupState::Standby => axis.command_rest(self.now, feedback),
-                GroupState::Moving | GroupState::Stopping => {
-                    axis.command_follow(self.now, self.t, feedback)
-                }
+                GroupState::Enabling | GroupState::Standby => axis.command_rest(self.now),
+                GroupState::Moving | GroupState::Stopping => axis.command_follow(self.now, self.t),
                 GroupState::FaultStop => {
                     let sent = u32::try_from(self.t).unwrap_or(0).saturating_add(1);
                     let left = self.fault_ramp.saturating_sub(sent);
@@ -205,34 +222,16 @@ impl<const N: usize> Group<N> {
         }
     }
 
-    fn hear(&mut self, n: usize, feedback: &[AxisFeedback; N]) {
-        let (Some(axis), Some(feedback)) = (self.axes.get_mut(n), feedback.get(n)) else {
-            return;
-        };
-        if let Some(state) = axis.hear(feedback) {
-            self.report(GroupEvent::AxisState {
-                axis: n as u8,
-                state,
-            });
-        }
-    }
-
-    fn report(&mut self, event: GroupEvent) {
-        if self.events.push_back(event).is_err() {
-            self.lost = self.lost.saturating_add(1);
-        }
-    }
-
     fn enter(&mut self, to: GroupState) {
         let from = core::mem::replace(&mut self.state, to);
-        self.report(GroupEvent::State { from, to });
+        self.events.report(GroupEvent::State { from, to });
     }
 
     /// Requests: network up, release, stop.
-    fn obey(&mut self, request: &Request, feedback: &[AxisFeedback; N]) {
+    fn obey(&mut self, request: &Request) {
         let ready = request.network_ready;
-        let left_out = |(n, axis): (usize, &Axis)| axis.faulted && is_in(request.absent, n);
-        self.network_was_down |= !ready || self.axes.iter().enumerate().any(left_out);
+        let left_out = |axis: &Axis| axis.faulted && axis.is_in(request.absent);
+        self.network_was_down |= !ready || self.axes.iter().any(left_out);
         let enable = match self.state {
             GroupState::Idle => ready,
             GroupState::Faulted => ready && self.network_was_down,
@@ -247,17 +246,17 @@ impl<const N: usize> Group<N> {
             self.begin_enabling(request.absent);
         }
         if request.release
-            && let Err(refusal) = self.release(request.stop, feedback)
+            && let Err(refusal) = self.release(request.stop)
         {
-            self.report(GroupEvent::ReleaseRefused(refusal));
+            self.events.report(GroupEvent::ReleaseRefused(refusal));
         }
     }
 
     fn begin_enabling(&mut self, absent: u32) {
         self.enter(GroupState::Enabling);
         self.absent = absent;
-        for (n, axis) in self.axes.iter_mut().enumerate() {
-            axis.restart(is_in(absent, n));
+        for axis in &mut self.axes {
+            axis.restart(absent);
         }
         self.set_stage(Goal::Disabled);
     }
@@ -269,41 +268,42 @@ impl<const N: usize> Group<N> {
         }
     }
 
-    fn release(&mut self, stop: bool, feedback: &[AxisFeedback; N]) -> Result<(), Refusal> {
+    fn release(&mut self, stop: bool) -> Result<(), Refusal> {
         if self.state != GroupState::Standby {
             return Err(Refusal::NotInStandby(self.state));
         }
         if stop {
             return Err(Refusal::StopRequested);
         }
-        for (axis, feedback) in (0u8..).zip(feedback) {
-            if is_in(self.absent, usize::from(axis)) {
-                continue;
-            }
-            if !feedback.fresh {
+        for axis in &self.axes {
+            let AxisFeedback {
+                velocity, fresh, ..
+            } = axis.feedback;
+            let axis = match axis.absent {
+                true => continue,
+                false => axis.n,
+            };
+            if !fresh {
                 return Err(Refusal::NotFresh { axis });
             }
-            if feedback.velocity.unsigned_abs() > self.config.standstill_rpm {
-                return Err(Refusal::NotAtRest {
-                    axis,
-                    velocity: feedback.velocity,
-                });
+            if velocity.unsigned_abs() > self.config.standstill_rpm {
+                return Err(Refusal::NotAtRest { axis, velocity });
             }
         }
         self.program.map_err(Refusal::Program)?;
-        self.hold_actual(feedback);
+        self.hold_actual();
         self.begin_step(0).map_err(Refusal::Program)?;
         self.enter(GroupState::Moving);
-        self.report(GroupEvent::StepStarted { step: 0 });
+        self.events.report(GroupEvent::StepStarted { step: 0 });
         Ok(())
     }
 
     /// References at rest where the axes are.
-    fn hold_actual(&mut self, feedback: &[AxisFeedback; N]) {
+    fn hold_actual(&mut self) {
         self.t = 0;
-        for (axis, feedback) in self.axes.iter_mut().zip(feedback) {
-            let position = if feedback.fresh {
-                feedback.position
+        for axis in &mut self.axes {
+            let position = if axis.feedback.fresh {
+                axis.feedback.position
             } else {
                 axis.reference.end()
             };
@@ -369,18 +369,18 @@ impl<const N: usize> Group<N> {
     }
 
     /// What goes on by itself in each state.
-    fn advance(&mut self, feedback: &[AxisFeedback; N]) {
+    fn advance(&mut self) {
         match self.state {
             GroupState::Idle | GroupState::Standby | GroupState::Faulted => {}
-            GroupState::Enabling => self.advance_enabling(feedback),
-            GroupState::Moving => self.advance_program(feedback),
-            GroupState::Stopping => self.advance_stopping(feedback),
-            GroupState::FaultStop => self.advance_fault_stop(feedback),
+            GroupState::Enabling => self.advance_enabling(),
+            GroupState::Moving => self.advance_program(),
+            GroupState::Stopping => self.advance_stopping(),
+            GroupState::FaultStop => self.advance_fault_stop(),
         }
     }
 
     /// All axes reach a state before the next transition is commanded.
-    fn advance_enabling(&mut self, feedback: &[AxisFeedback; N]) {
+    fn advance_enabling(&mut self) {
         if !self.axes.iter().all(|a| a.absent || a.machine.reached()) {
             return;
         }
@@ -389,14 +389,10 @@ impl<const N: usize> Group<N> {
             Goal::Ready => self.set_stage(Goal::SwitchedOn),
             Goal::SwitchedOn => self.set_stage(Goal::Enabled),
             Goal::Enabled | Goal::QuickStop => {
-                if feedback
-                    .iter()
-                    .zip(&self.axes)
-                    .all(|(f, a)| a.absent || f.fresh)
-                {
-                    self.hold_actual(feedback);
-                    for (axis, feedback) in self.axes.iter_mut().zip(feedback) {
-                        axis.home = feedback.position;
+                if self.axes.iter().all(|a| a.absent || a.feedback.fresh) {
+                    self.hold_actual();
+                    for axis in &mut self.axes {
+                        axis.home = axis.feedback.position;
                     }
                     self.enter(GroupState::Standby);
                 }
@@ -404,13 +400,13 @@ impl<const N: usize> Group<N> {
         }
     }
 
-    fn advance_program(&mut self, feedback: &[AxisFeedback; N]) {
+    fn advance_program(&mut self) {
         let finished = match self.config.program.steps.get(self.step) {
             None => true,
             Some(Step::Dwell(time)) => {
                 u32::try_from(self.t).is_ok_and(|t| t >= self.config.cycles(*time))
             }
-            Some(Step::Move(_)) => self.all_arrived(feedback),
+            Some(Step::Move(_)) => self.all_arrived(),
         };
         // An arrival that failed has already begun the stop.
         if !finished || self.state != GroupState::Moving {
@@ -419,71 +415,61 @@ impl<const N: usize> Group<N> {
         let next = self.step.saturating_add(1);
         if next >= self.config.program.steps.len() {
             self.enter(GroupState::Standby);
-            self.report(GroupEvent::ProgramDone);
+            self.events.report(GroupEvent::ProgramDone);
         } else if let Err(error) = self.begin_step(next) {
             self.fault(None, FaultCause::Program(error));
         } else {
-            self.report(GroupEvent::StepStarted { step: next as u8 });
+            self.events
+                .report(GroupEvent::StepStarted { step: next as u8 });
         }
     }
 
     /// Whether every axis has come to rest on its target.
-    fn all_arrived(&mut self, feedback: &[AxisFeedback; N]) -> bool {
-        let (group, t) = (self.config, self.t);
-        let patience = group.cycles(group.settle_timeout);
+    fn all_arrived(&mut self) -> bool {
         let mut all = true;
-        for n in 0..N {
-            let (Some(axis), Some(feedback)) = (self.axes.get_mut(n), feedback.get(n)) else {
-                continue;
-            };
+        for axis in &mut self.axes {
             if axis.arrived || axis.absent {
                 continue;
             }
             all = false;
-            if !axis.ended(t, 0) {
-                continue;
-            }
-            let error = axis.error(t, feedback.position);
-            let target = axis.reference.end();
-            if axis.settle(feedback, Some(error), group) {
-                axis.arrived = true;
-                self.report(GroupEvent::Arrived {
-                    axis: n as u8,
-                    target,
-                    error,
-                });
-            } else if axis.ended(t, patience) {
-                self.fault(Some(n), FaultCause::NotArrived { error });
-                return false;
+            match axis.comes_to_rest(self.t, true, self.config) {
+                Ok(None) => {}
+                Ok(Some(error)) => {
+                    axis.arrived = true;
+                    self.events.report(GroupEvent::Arrived {
+                        axis: axis.n,
+                        target: axis.reference.end(),
+                        error,
+                    });
+                }
+                Err(cause) => {
+                    let axis = axis.n;
+                    self.fault(Some(axis), cause);
+                    return false;
+                }
             }
         }
         all
     }
 
-    fn advance_stopping(&mut self, feedback: &[AxisFeedback; N]) {
-        let (group, t) = (self.config, self.t);
-        let patience = group.cycles(group.settle_timeout);
+    fn advance_stopping(&mut self) {
         let mut all = true;
-        for n in 0..N {
-            let (Some(axis), Some(feedback)) = (self.axes.get_mut(n), feedback.get(n)) else {
+        for axis in &mut self.axes {
+            if axis.absent {
                 continue;
-            };
-            let rests = axis.absent || (axis.ended(t, 0) && axis.settle(feedback, None, group));
-            all &= rests;
-            if !rests && axis.ended(t, patience) {
-                let error = axis.error(t, feedback.position);
-                self.fault(Some(n), FaultCause::NotArrived { error });
-                return;
+            }
+            match axis.comes_to_rest(self.t, false, self.config) {
+                Ok(rests) => all &= rests.is_some(),
+                Err(cause) => {
+                    let axis = axis.n;
+                    self.fault(Some(axis), cause);
+                    return;
+                }
             }
         }
         if all {
-            self.hold_actual(feedback);
+            self.hold_actual();
             self.enter(GroupState::Standby);
         }
     }
-}
-
-/// Whether a set of axes holds axis `n`.
-fn is_in(axes: u32, n: usize) -> bool {
-    axes.checked_shr(n as u32).is_some_and(|bits| bits & 1 != 0)
 }

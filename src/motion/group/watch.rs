@@ -1,13 +1,14 @@
 //! Supervision: what stops the group, and the stop after a fault.
 
-use super::{AxisFeedback, FaultCause, Group, GroupEvent, GroupState, Request, is_in};
+use super::axis::Axis;
+use super::{FaultCause, Group, GroupEvent, GroupState, Request};
 use crate::cia402::{Goal, StatusWord};
 
 impl<const N: usize> Group<N> {
     /// Looks for faults in what was asked and reported in this step.
-    pub(super) fn watch(&mut self, request: &Request, feedback: &[AxisFeedback; N]) {
+    pub(super) fn watch(&mut self, request: &Request) {
         if let Some((axis, cause)) = request.fault {
-            self.fault(Some(axis), cause);
+            self.fault(u8::try_from(axis).ok(), cause);
         }
         let state = self.state;
         match state {
@@ -16,9 +17,12 @@ impl<const N: usize> Group<N> {
             _ if !request.network_ready => self.fault(None, FaultCause::NetworkLost),
             _ => {}
         }
-        for n in 0..N {
-            if let Some(cause) = self.find_fault(n, state, request, feedback) {
-                self.fault(Some(n), cause);
+        for n in 0..self.axes.len() {
+            if let Some(axis) = self.axes.get(n)
+                && let Some(cause) = self.find_fault(axis, state, request)
+            {
+                let axis = axis.n;
+                self.fault(Some(axis), cause);
             }
         }
         if self.state == GroupState::FaultStop {
@@ -26,20 +30,14 @@ impl<const N: usize> Group<N> {
         }
     }
 
-    /// A fault of axis `n` that was not reported yet, in the state that the
+    /// A fault of an axis that was not reported yet, in the state that the
     /// group had at the beginning of the step.
-    fn find_fault(
-        &self,
-        n: usize,
-        state: GroupState,
-        request: &Request,
-        feedback: &[AxisFeedback; N],
-    ) -> Option<FaultCause> {
-        let (axis, feedback) = (self.axes.get(n)?, feedback.get(n)?);
+    fn find_fault(&self, axis: &Axis, state: GroupState, request: &Request) -> Option<FaultCause> {
+        let feedback = &axis.feedback;
         if axis.absent {
             return None;
         }
-        if request.network_ready && is_in(request.absent, n) && !axis.faulted {
+        if request.network_ready && axis.is_in(request.absent) && !axis.faulted {
             return Some(FaultCause::LeftOperational);
         }
         if axis.missing >= self.config.missing_tpdo_max && !axis.faulted {
@@ -69,19 +67,17 @@ impl<const N: usize> Group<N> {
             return Some(FaultCause::LeftEnabled { status });
         }
         let allowed = axis.config.following_error_max;
-        let error = axis.error(self.t, feedback.position);
+        let error = axis.error(self.t);
         (self.state != GroupState::FaultStop && error.unsigned_abs() > allowed)
             .then_some(FaultCause::FollowingError { error, allowed })
     }
 
     /// Reports a fault and, if the group is not stopped for one yet, stops it.
     /// Before the axes are to be enabled a fault is only reported.
-    pub(super) fn fault(&mut self, axis: Option<usize>, cause: FaultCause) {
-        self.report(GroupEvent::Fault {
-            axis: axis.and_then(|n| u8::try_from(n).ok()),
-            cause,
-        });
-        if let Some(axis) = axis.and_then(|n| self.axes.get_mut(n)) {
+    #[inline(never)]
+    pub(super) fn fault(&mut self, axis: Option<u8>, cause: FaultCause) {
+        self.events.report(GroupEvent::Fault { axis, cause });
+        if let Some(axis) = axis.and_then(|n| self.axes.get_mut(usize::from(n))) {
             axis.faulted = true;
         }
         match self.state {
@@ -107,25 +103,20 @@ impl<const N: usize> Group<N> {
 
     /// Axes whose drives have left operation enabled, each reported once.
     fn exclude_lost_axes(&mut self) {
-        for n in 0..N {
-            let Some(axis) = self.axes.get_mut(n) else {
-                continue;
-            };
+        for axis in &mut self.axes {
             let Some(state) = axis.state() else { continue };
             if !state.is_enabled() && !axis.coasting {
                 axis.coasting = true;
                 axis.excluded = true;
-                self.report(GroupEvent::Coasting {
-                    axis: n as u8,
-                    state,
-                });
+                let axis = axis.n;
+                self.events.report(GroupEvent::Coasting { axis, state });
             }
         }
     }
 
     /// Waits for standstill, then disables. Axes that report nothing are not
     /// waited for.
-    pub(super) fn advance_fault_stop(&mut self, feedback: &[AxisFeedback; N]) {
+    pub(super) fn advance_fault_stop(&mut self) {
         let group = self.config;
         let t = u32::try_from(self.t).unwrap_or(0);
         if t < self.fault_ramp {
@@ -134,18 +125,14 @@ impl<const N: usize> Group<N> {
         let patience = group.cycles(group.settle_timeout);
         let late = t >= self.fault_ramp.saturating_add(patience);
         let mut all = true;
-        for n in 0..N {
-            let (Some(axis), Some(feedback)) = (self.axes.get_mut(n), feedback.get(n)) else {
-                continue;
-            };
+        for axis in &mut self.axes {
             let silent = axis.missing >= group.missing_tpdo_max;
-            let rests = axis.settle(feedback, None, group);
-            all &= rests || silent || axis.absent;
-            if late && !rests && !axis.absent {
-                let velocity = feedback.velocity;
-                self.report(GroupEvent::NotAtRest {
-                    axis: n as u8,
-                    velocity,
+            let rests = axis.absent || axis.settle(None, group);
+            all &= rests || silent;
+            if late && !rests {
+                self.events.report(GroupEvent::NotAtRest {
+                    axis: axis.n,
+                    velocity: axis.feedback.velocity,
                 });
             }
         }
