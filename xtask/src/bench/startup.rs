@@ -119,3 +119,26 @@ impl Figures {
         ])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slow_configuration_is_told() {
+        let judged = |took_ms| Configuration {
+            took: Time::from_ms(took_ms),
+            wire_bound: Time::from_ms(100),
+            sequential: Time::from_ms(500),
+            exchanges: 300,
+        };
+        assert!(Figures::new(&judged(130), 6).missed().is_empty());
+        let missed = Figures::new(&judged(131), 6).missed();
+        assert!(missed[0].contains("131.0 ms") && missed[0].contains("1.31"));
+        let report = Report::new(Figures::new(&judged(131), 6), 1, 0.5, &missed);
+        let object: serde_json::Value = serde_json::from_str(&report.json().unwrap()).unwrap();
+        assert_eq!(object["result"], "failed");
+        assert_eq!(object["configure_ms"], 131.0);
+        assert_eq!(object["reason"], missed[0]);
+    }
+}
