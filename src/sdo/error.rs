@@ -91,7 +91,10 @@ impl fmt::Display for SdoError {
                 "{at}: no answer within {} ms; check the node's supply, node-ID and bit rate",
                 waited.as_millis()
             ),
-            SdoError::Aborted { at, code } => write!(f, "{at}: refused with {code}"),
+            SdoError::Aborted { at, code } => write!(
+                f,
+                "{at}: refused with {code}; compare with the node's object dictionary"
+            ),
             SdoError::Protocol { at, code } => write!(
                 f,
                 "{at}: the node broke the SDO protocol: {code}; \
@@ -99,7 +102,8 @@ impl fmt::Display for SdoError {
             ),
             SdoError::NoRoom { at, size } => write!(
                 f,
-                "{at}: the answer has at least {size} bytes, more than there is room for"
+                "{at}: the answer has at least {size} bytes, more than there is room for; \
+                 read it with room for all of it"
             ),
             SdoError::Size {
                 at,
@@ -107,9 +111,12 @@ impl fmt::Display for SdoError {
                 received,
             } => write!(
                 f,
-                "{at}: the node announced {announced} bytes and sent {received}"
+                "{at}: the node announced {announced} bytes and sent {received}; \
+                 check that no other node has its node-ID"
             ),
-            SdoError::Cancelled { at, code } => write!(f, "{at}: cancelled with {code}"),
+            SdoError::Cancelled { at, code } => {
+                write!(f, "{at}: cancelled by the caller with {code}")
+            }
         }
     }
 }

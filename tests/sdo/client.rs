@@ -261,7 +261,7 @@ fn errors_say_what_to_do() {
     assert_eq!(
         refused.to_string(),
         "1000h:00: refused with 08000022h (data cannot be transferred or stored in the \
-         present device state)"
+         present device state); compare with the node's object dictionary"
     );
 }
 
