@@ -3,7 +3,7 @@
 //! (CiA 301, 7.2.4.3.8 .. 7.2.4.3.16).
 
 use super::abort::AbortCode;
-use super::command::{BLOCK_MAX, BlockSegment, SEGMENT_MAX};
+use super::command::{BLOCK_MAX, BlockSegment, Command, End, SEGMENT_MAX};
 use super::crc::Crc16;
 
 /// After so many acknowledgements in a row of nothing at all the sender gives
@@ -21,15 +21,6 @@ pub(super) const fn check_block_size(block_size: u8) -> Result<u8, AbortCode> {
     } else {
         Err(AbortCode::BLOCK_SIZE)
     }
-}
-
-/// What the end command tells of the transfer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct End {
-    /// Unused bytes of the last segment.
-    pub(super) unused: u8,
-    /// 0 if one side does not compute it.
-    pub(super) crc: u16,
 }
 
 /// The sending end. It keeps no data: what has to be sent again is read again.
@@ -108,13 +99,10 @@ impl Sender {
         })
     }
 
-    /// The receiver has the first `sequence` segments of the block and wants
-    /// `block_size` in the next. Yields the end once it has everything.
-    pub(super) fn acknowledged(
-        &mut self,
-        sequence: u8,
-        block_size: u8,
-    ) -> Result<Option<End>, AbortCode> {
+    /// The receiver tells how many segments of the block it has and how many it
+    /// wants in the next. Yields the end once it has everything.
+    pub(super) fn acknowledged(&mut self, command: Command) -> Result<Option<End>, AbortCode> {
+        let (sequence, block_size) = command.acknowledged();
         if sequence > self.sequence {
             return Err(AbortCode::SEQUENCE_NUMBER);
         }

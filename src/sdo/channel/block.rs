@@ -2,29 +2,20 @@
 
 use super::{BLOCK_SIZE, Channel, Payload, State, Step};
 use crate::sdo::AbortCode;
-use crate::sdo::block::{End, Receiver, Sender, check_block_size};
-use crate::sdo::command::{Answer, BlockSegment, Bytes, Request, SEGMENT_MAX};
+use crate::sdo::block::{Receiver, Sender, check_block_size};
+use crate::sdo::command::{Answer, BlockSegment, Command, Request, SEGMENT_MAX};
 
 impl Channel {
     /// CiA 301, 7.2.4.3.9.
-    pub(super) fn begin_block_download(&mut self, size: u32) -> Request {
+    pub(super) fn begin_block_download(&mut self, size: u32) -> Command {
         self.state = State::BlockDownload;
-        Request::BlockDownload {
-            at: self.at,
-            crc: true,
-            size: Some(size),
-        }
+        Command::block_of(Request::BlockDownload.code(), self.at, Some(size))
     }
 
     /// CiA 301, 7.2.4.3.13.
-    pub(super) fn begin_block_upload(&mut self) -> Request {
+    pub(super) fn begin_block_upload(&mut self) -> Command {
         self.state = State::BlockUpload;
-        Request::BlockUpload {
-            at: self.at,
-            crc: true,
-            block_size: BLOCK_SIZE,
-            protocol_switch: 0,
-        }
+        Command::block_for(Request::BlockUpload.code(), self.at, BLOCK_SIZE)
     }
 
     /// The server does not know block transfers.
@@ -37,53 +28,55 @@ impl Channel {
     }
 
     /// An answer of a block transfer, other than a segment.
-    pub(super) fn block_step(&mut self, answer: Answer, payload: &mut dyn Payload) -> Step {
+    pub(super) fn block_step(
+        &mut self,
+        answer: Answer,
+        command: Command,
+        payload: &mut dyn Payload,
+    ) -> Step {
         match (&mut self.state, answer) {
-            (
-                State::BlockDownload,
-                Answer::BlockDownload {
-                    crc, block_size, ..
-                },
-            ) => match check_block_size(block_size) {
-                Ok(block_size) => {
-                    self.state = State::BlockDownloadSegments(Sender::new(block_size, crc));
-                    Step::Wait
+            (State::BlockDownload, Answer::BlockDownload) => {
+                let [block_size, ..] = command.tail();
+                match check_block_size(block_size) {
+                    Ok(block_size) => {
+                        let sender = Sender::new(block_size, command.has_crc());
+                        self.state = State::BlockDownloadSegments(sender);
+                        Step::Wait
+                    }
+                    Err(code) => Step::Violation(code),
                 }
-                Err(code) => Step::Violation(code),
-            },
-            (
-                State::BlockDownloadSegments(sender),
-                Answer::BlockDownloadAcknowledge {
-                    sequence,
-                    block_size,
-                },
-            ) => match sender.acknowledged(sequence, block_size) {
-                Ok(Some(End { unused, crc })) => {
-                    self.state = State::BlockDownloadEnd;
-                    Step::Send(Request::BlockDownloadEnd { unused, crc })
+            }
+            (State::BlockDownloadSegments(sender), Answer::BlockDownloadAcknowledge) => {
+                match sender.acknowledged(command) {
+                    Ok(Some(end)) => {
+                        self.state = State::BlockDownloadEnd;
+                        let code = Request::BlockDownloadEnd.code();
+                        Step::Send(Command::block_end(code, end))
+                    }
+                    Ok(None) => Step::Wait,
+                    Err(code) => Step::Violation(code),
                 }
-                Ok(None) => Step::Wait,
-                Err(code) => Step::Violation(code),
-            },
+            }
             (State::BlockDownloadEnd, Answer::BlockDownloadEnd) => {
                 Step::Done(self.size.unwrap_or(0))
             }
-            (State::BlockUpload, Answer::BlockUpload { crc, size, .. }) => {
-                self.size = size;
-                if let Err(code) = payload.begin(size) {
-                    return self.refused(code, size.unwrap_or(0));
+            (State::BlockUpload, Answer::BlockUpload) => {
+                self.size = command.block_data();
+                if let Err(code) = payload.begin(self.size) {
+                    return self.refused(code, self.size.unwrap_or(0));
                 }
-                self.state = State::BlockUploadSegments(Receiver::new(BLOCK_SIZE, crc));
-                Step::Send(Request::BlockUploadStart)
+                let receiver = Receiver::new(BLOCK_SIZE, command.has_crc());
+                self.state = State::BlockUploadSegments(receiver);
+                Step::Send(Command::bare(Request::BlockUploadStart.code(), false))
             }
-            (State::BlockUploadSegments(receiver), Answer::BlockUploadEnd { unused, crc }) => {
-                match receiver.end(End { unused, crc }) {
+            (State::BlockUploadSegments(receiver), Answer::BlockUploadEnd) => {
+                match receiver.end(command.end()) {
                     Ok((data, len)) => {
                         let data = data.get(..len).unwrap_or(&data);
                         match self.take(data, true, payload) {
                             Ok(()) => {
                                 self.state = State::Finished(self.received);
-                                Step::Send(Request::BlockUploadEnd)
+                                Step::Send(Command::bare(Request::BlockUploadEnd.code(), false))
                             }
                             Err(step) => step,
                         }
@@ -99,7 +92,7 @@ impl Channel {
     /// for an abort. `None` if this is no such moment.
     pub(super) fn block_segment(
         &mut self,
-        bytes: Bytes,
+        command: Command,
         payload: &mut dyn Payload,
     ) -> Option<Step> {
         let State::BlockUploadSegments(receiver) = &mut self.state else {
@@ -108,9 +101,9 @@ impl Channel {
         if receiver.is_complete() {
             return None;
         }
-        let Some(segment) = BlockSegment::decode(bytes) else {
-            return match Answer::decode(bytes) {
-                Some(Answer::Abort { .. }) => None,
+        let Some(segment) = BlockSegment::decode(command.0) else {
+            return match command.answer() {
+                Some(Answer::Abort) => None,
                 _ => Some(Step::Violation(AbortCode::SEQUENCE_NUMBER)),
             };
         };
@@ -133,7 +126,7 @@ impl Channel {
     pub(super) fn block_poll(
         &mut self,
         payload: &mut dyn Payload,
-    ) -> Result<Option<Bytes>, AbortCode> {
+    ) -> Result<Option<Command>, AbortCode> {
         let size = self.size.unwrap_or(0);
         match &mut self.state {
             State::BlockDownloadSegments(sender) => {
@@ -145,19 +138,14 @@ impl Channel {
                 let len = left.min(SEGMENT_MAX);
                 payload.read(offset, data.get_mut(..len).unwrap_or(&mut []));
                 let segment = sender.segment(data, len, len == left)?;
-                Ok(Some(segment.encode()))
+                Ok(Some(Command(segment.encode())))
             }
-            State::BlockUploadSegments(receiver) => Ok(receiver
-                .stall()
-                .map(|sequence| acknowledge(sequence).encode())),
+            State::BlockUploadSegments(receiver) => Ok(receiver.stall().map(acknowledge)),
             _ => Ok(None),
         }
     }
 }
 
-const fn acknowledge(sequence: u8) -> Request {
-    Request::BlockUploadAcknowledge {
-        sequence,
-        block_size: BLOCK_SIZE,
-    }
+const fn acknowledge(sequence: u8) -> Command {
+    Command::acknowledge(Request::BlockUploadAcknowledge.code(), sequence, BLOCK_SIZE)
 }

@@ -29,7 +29,7 @@ mod segmented;
 
 use super::abort::AbortCode;
 use super::block::{Receiver, Sender};
-use super::command::{Answer, BLOCK_MAX, Bytes, Request};
+use super::command::{Answer, BLOCK_MAX, Bytes, Command};
 use super::error::SdoError;
 use super::progress::{Progress, StartError};
 use crate::frame::Frame;
@@ -138,7 +138,7 @@ enum Step {
     Wait,
     /// Not an answer to what was asked: wait on, the timeout keeps running.
     Ignore,
-    Send(Request),
+    Send(Command),
     Done(u32),
     /// The server refused.
     Refused(AbortCode),
@@ -269,10 +269,7 @@ impl Channel {
             }
             State::Finished(len) => self.progress(Step::Done(len), now),
             _ => match self.block_poll(payload) {
-                Ok(Some(bytes)) => {
-                    self.deadline = now + self.patience();
-                    Progress::Send(self.frame(bytes))
-                }
+                Ok(Some(command)) => self.progress(Step::Send(command), now),
                 Ok(None) => {
                     let error = SdoError::Timeout {
                         at: self.at,
@@ -299,42 +296,41 @@ impl Channel {
         {
             return Progress::Nothing;
         }
-        let bytes = frame.padded();
-        let step = match self.block_segment(bytes, payload) {
+        let command = Command(frame.padded());
+        let step = match self.block_segment(command, payload) {
             Some(step) => step,
-            None => match Answer::decode(bytes) {
-                Some(answer) => self.step(answer, payload),
-                None => Step::Ignore,
+            None => match command.answer() {
+                // What names an entry answers a request for that entry.
+                Some(answer) if !answer.is_addressed() || command.address() == self.at => {
+                    self.step(answer, command, payload)
+                }
+                _ => Step::Ignore,
             },
         };
         self.progress(step, now)
     }
 
-    fn step(&mut self, answer: Answer, payload: &mut dyn Payload) -> Step {
-        // What names an entry answers a request for that entry.
-        if answer.address().is_some_and(|of| of != self.at) {
-            return Step::Ignore;
-        }
+    fn step(&mut self, answer: Answer, command: Command, payload: &mut dyn Payload) -> Step {
         match (self.state, answer) {
-            (State::BlockDownload | State::BlockUpload, Answer::Abort { code, .. })
-                if code == AbortCode::COMMAND =>
+            (State::BlockDownload | State::BlockUpload, Answer::Abort)
+                if command.abort_code() == AbortCode::COMMAND =>
             {
                 self.fall_back(payload)
             }
-            (_, Answer::Abort { code, .. }) => Step::Refused(code),
-            (State::Download { expedited }, Answer::Download { .. }) => {
+            (_, Answer::Abort) => Step::Refused(command.abort_code()),
+            (State::Download { expedited }, Answer::Download) => {
                 self.download_begun(expedited, payload)
             }
-            (State::DownloadSegment { sent, toggle }, Answer::DownloadSegment { toggle: got }) => {
-                self.segment_taken(sent, toggle, got, payload)
+            (State::DownloadSegment { sent, toggle }, Answer::DownloadSegment) => {
+                self.segment_taken(sent, toggle, command.toggle(), payload)
             }
-            (State::Upload | State::BlockUpload, Answer::Upload { data, .. }) => {
-                self.upload_begun(data, payload)
+            (State::Upload | State::BlockUpload, Answer::Upload) => {
+                self.upload_begun(command, payload)
             }
-            (State::UploadSegment { toggle }, Answer::UploadSegment(segment)) => {
-                self.segment_given(toggle, segment, payload)
+            (State::UploadSegment { toggle }, Answer::UploadSegment) => {
+                self.segment_given(toggle, command, payload)
             }
-            (_, answer) => self.block_step(answer, payload),
+            (_, answer) => self.block_step(answer, command, payload),
         }
     }
 
@@ -346,7 +342,7 @@ impl Channel {
                 self.deadline = now + self.patience();
                 Progress::Nothing
             }
-            Step::Send(request) => Progress::Send(self.send(request, now)),
+            Step::Send(command) => Progress::Send(self.send(command, now)),
             Step::Done(len) => {
                 self.state = State::Idle;
                 Progress::Done(Transfer { at, len })
@@ -404,20 +400,17 @@ impl Channel {
         }
     }
 
-    fn send(&mut self, request: Request, now: Instant) -> Frame {
+    fn send(&mut self, command: Command, now: Instant) -> Frame {
         self.deadline = now + self.patience();
-        self.frame(request.encode())
+        self.frame(command)
     }
 
     /// Fails the transfer, tells the server, and keeps the channel closed.
     fn close(&mut self, error: SdoError, now: Instant) -> Progress<Transfer> {
         self.state = State::Quarantine;
         self.deadline = now + self.quarantine;
-        let abort = Request::Abort {
-            at: error.address(),
-            code: error.code(),
-        };
-        Progress::Failed(error, Some(self.frame(abort.encode())))
+        let abort = Command::abort(error.address(), error.code());
+        Progress::Failed(error, Some(self.frame(abort)))
     }
 
     /// How long to wait in the present state.
@@ -437,8 +430,8 @@ impl Channel {
         )
     }
 
-    fn frame(&self, bytes: Bytes) -> Frame {
-        Frame::full(CobId::of(FunctionCode::SdoRequest, self.node), bytes)
+    fn frame(&self, command: Command) -> Frame {
+        Frame::full(CobId::of(FunctionCode::SdoRequest, self.node), command.0)
     }
 }
 

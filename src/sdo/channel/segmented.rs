@@ -2,32 +2,30 @@
 
 use super::{Channel, Payload, State, Step};
 use crate::sdo::AbortCode;
-use crate::sdo::command::{EXPEDITED_MAX, Initiate, Request, SEGMENT_MAX, Segment};
+use crate::sdo::command::{Command, EXPEDITED_MAX, Request, SEGMENT_MAX};
 
 impl Channel {
     /// CiA 301, 7.2.4.3.3.
-    pub(super) fn begin_download(&mut self, size: u32, payload: &mut dyn Payload) -> Request {
+    pub(super) fn begin_download(&mut self, size: u32, payload: &mut dyn Payload) -> Command {
+        let code = Request::Download.code();
         let mut data = [0; EXPEDITED_MAX];
         let expedited = usize::try_from(size)
             .ok()
             .and_then(|size| data.get_mut(..size))
             .and_then(|space| {
                 payload.read(0, space);
-                Initiate::expedited(space)
+                Command::expedited(code, self.at, space)
             });
         self.state = State::Download {
             expedited: expedited.is_some(),
         };
-        Request::Download {
-            at: self.at,
-            data: expedited.unwrap_or(Initiate::Segmented { size: Some(size) }),
-        }
+        expedited.unwrap_or_else(|| Command::segmented(code, self.at, Some(size)))
     }
 
     /// CiA 301, 7.2.4.3.6.
-    pub(super) fn begin_upload(&mut self) -> Request {
+    pub(super) fn begin_upload(&mut self) -> Command {
         self.state = State::Upload;
-        Request::Upload { at: self.at }
+        Command::addressed(Request::Upload.code(), self.at, [0; 4])
     }
 
     pub(super) fn download_begun(&mut self, expedited: bool, payload: &mut dyn Payload) -> Step {
@@ -61,64 +59,62 @@ impl Channel {
         let mut data = [0; SEGMENT_MAX];
         let piece = data.get_mut(..len as usize).unwrap_or(&mut []);
         payload.read(sent, piece);
-        match Segment::new(toggle, len == left, piece) {
+        let code = Request::DownloadSegment.code();
+        match Command::segment(code, toggle, len == left, piece) {
             Some(segment) => {
                 let sent = sent + len;
                 self.state = State::DownloadSegment { sent, toggle };
-                Step::Send(Request::DownloadSegment(segment))
+                Step::Send(segment)
             }
             None => Step::Violation(AbortCode::GENERAL),
         }
     }
 
     /// CiA 301, 7.2.4.3.6. A block upload may be answered like this, too.
-    pub(super) fn upload_begun(&mut self, initiate: Initiate, payload: &mut dyn Payload) -> Step {
-        let size = match initiate {
-            Initiate::Expedited { len, .. } => Some(len.map_or(EXPEDITED_MAX as u32, u32::from)),
-            Initiate::Segmented { size } => size,
+    pub(super) fn upload_begun(&mut self, command: Command, payload: &mut dyn Payload) -> Step {
+        let expedited = command.is_expedited();
+        self.size = match command.size() {
+            None if expedited => Some(EXPEDITED_MAX as u32),
+            size => size,
         };
-        self.size = size;
-        if let Err(code) = payload.begin(size) {
-            return self.refused(code, size.unwrap_or(0));
+        if let Err(code) = payload.begin(self.size) {
+            return self.refused(code, self.size.unwrap_or(0));
         }
-        match initiate {
-            Initiate::Expedited { data, len } => {
-                let len = len.map_or(EXPEDITED_MAX, usize::from);
-                let data = data.get(..len).unwrap_or(&data);
-                match self.take(data, true, payload) {
-                    Ok(()) => Step::Done(self.received),
-                    Err(step) => step,
-                }
-            }
-            Initiate::Segmented { .. } => {
-                let toggle = false;
-                self.state = State::UploadSegment { toggle };
-                Step::Send(Request::UploadSegment { toggle })
-            }
+        if !expedited {
+            return self.ask_segment(false);
         }
+        let data = command.tail();
+        let len = self.size.unwrap_or(0) as usize;
+        match self.take(data.get(..len).unwrap_or(&data), true, payload) {
+            Ok(()) => Step::Done(self.received),
+            Err(step) => step,
+        }
+    }
+
+    fn ask_segment(&mut self, toggle: bool) -> Step {
+        self.state = State::UploadSegment { toggle };
+        Step::Send(Command::bare(Request::UploadSegment.code(), toggle))
     }
 
     /// CiA 301, 7.2.4.3.7.
     pub(super) fn segment_given(
         &mut self,
         toggle: bool,
-        segment: Segment,
+        segment: Command,
         payload: &mut dyn Payload,
     ) -> Step {
-        if segment.toggle != toggle {
+        if segment.toggle() != toggle {
             return Step::Violation(AbortCode::TOGGLE);
         }
         if segment.is_fruitless() {
             return Step::Violation(AbortCode::COMMAND);
         }
-        if let Err(step) = self.take(segment.data(), segment.last, payload) {
+        if let Err(step) = self.take(segment.data(), segment.is_last(), payload) {
             return step;
         }
-        if segment.last {
+        if segment.is_last() {
             return Step::Done(self.received);
         }
-        let toggle = !toggle;
-        self.state = State::UploadSegment { toggle };
-        Step::Send(Request::UploadSegment { toggle })
+        self.ask_segment(!toggle)
     }
 }

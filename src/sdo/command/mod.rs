@@ -1,17 +1,18 @@
 //! The bytes of SDO frames: every command of the expedited, segmented and block
 //! protocols, both ways (CiA 301, 7.2.4.3).
 //!
-//! Decoding never fails on a length, because every SDO frame has eight bytes;
-//! it yields `None` for command specifiers that the standard does not know.
-//! Segments of a block carry no command specifier: see [`BlockSegment`].
+//! A [`Command`] is read where it stands: which one it is tell [`Request`] on
+//! the server's side and [`Answer`] on the client's; what it says tell its
+//! methods, each of them only for the commands that have the field. Nothing
+//! fails on a length, because every SDO frame has eight bytes. Segments of a
+//! block carry no command specifier: see [`BlockSegment`].
 
-mod answer;
-mod request;
+mod kind;
 
-pub use answer::Answer;
-pub use request::Request;
+pub use kind::{Answer, Request};
 
 use crate::id::{Address, Index, SubIndex};
+use crate::sdo::AbortCode;
 
 /// The data bytes of an SDO frame.
 pub type Bytes = [u8; 8];
@@ -23,155 +24,244 @@ pub const SEGMENT_MAX: usize = 7;
 /// Segments in a block (CiA 301, 7.2.4.3.10).
 pub const BLOCK_MAX: u8 = 127;
 
-const SPECIFIER_SHIFT: u8 = 5;
+/// `t` of a segment, and of what asks for or confirms one.
 const TOGGLE: u8 = 0x10;
+/// `e` of an initiate.
 const EXPEDITED: u8 = 0x02;
+/// `s` of an initiate.
 const SIZE_TOLD: u8 = 0x01;
+/// `n` of an expedited initiate: how many of the four bytes mean nothing.
+const EXPEDITED_UNUSED_SHIFT: u8 = 2;
+const EXPEDITED_UNUSED_MASK: u8 = 0x03;
+/// `c` of a segment.
 const LAST: u8 = 0x01;
-const ABORT: u8 = 0x80;
+/// `n` of a segment: how many of the seven bytes mean nothing.
+const UNUSED_SHIFT: u8 = 1;
+const UNUSED_MASK: u8 = 0x07;
 
-/// Sub-commands of the block protocols.
+/// The same in the block protocols.
 mod block {
-    pub(super) const SUB_MASK: u8 = 0x03;
-    pub(super) const INITIATE: u8 = 0;
-    pub(super) const END: u8 = 1;
-    pub(super) const ACKNOWLEDGE: u8 = 2;
-    pub(super) const START: u8 = 3;
     /// `cc` and `sc`: this side computes the CRC.
     pub(super) const CRC: u8 = 0x04;
     pub(super) const SIZE_TOLD: u8 = 0x02;
-    /// In the download command the sub-command has one bit only.
-    pub(super) const DOWNLOAD_END: u8 = 0x01;
     pub(super) const UNUSED_SHIFT: u8 = 2;
-    pub(super) const UNUSED_MASK: u8 = 0x07;
     /// `c` of a segment.
     pub(super) const LAST: u8 = 0x80;
     pub(super) const SEQUENCE_MASK: u8 = 0x7F;
 }
 
-/// What an initiate command says of the data (CiA 301, 7.2.4.3.3, 7.2.4.3.6).
+/// What the end command of a block transfer tells of the data
+/// (CiA 301, 7.2.4.3.11, 7.2.4.3.15).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Initiate {
-    /// The data itself: four bytes, `len` of them (1..=4) meant. `None`: the
-    /// sender does not tell how many, the receiver takes what the type needs.
-    Expedited {
-        /// The four bytes; those past `len` are zero.
-        data: [u8; EXPEDITED_MAX],
-        /// How many are meant.
-        len: Option<u8>,
-    },
-    /// Segments follow, of this many bytes in all if told.
-    Segmented {
-        /// Bytes in all.
-        size: Option<u32>,
-    },
+pub struct End {
+    /// Unused bytes of the last segment, 0..=7.
+    pub unused: u8,
+    /// Over all data; 0 if one side does not compute it.
+    pub crc: u16,
 }
 
-impl Initiate {
-    /// An expedited transfer of `data`; `None` unless it has 1..=4 bytes.
-    pub fn expedited(data: &[u8]) -> Option<Initiate> {
+/// The eight bytes of an SDO frame that is no segment of a block.
+///
+/// ```
+/// # use canmaster::{id::Address, sdo::command::{Command, Request}};
+/// let device_type = Address::new(0x1000, 0);
+/// let command = Command::addressed(Request::Upload.code(), device_type, [0; 4]);
+/// assert_eq!(command.0, [0x40, 0x00, 0x10, 0x00, 0, 0, 0, 0]);
+/// assert_eq!(command.request(), Some(Request::Upload));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Command(pub Bytes);
+
+/// Putting commands together. `code` is that of a [`Request`] or an [`Answer`].
+impl Command {
+    /// A command that names an entry, with its last four bytes.
+    pub const fn addressed(code: u8, at: Address, data: [u8; 4]) -> Command {
+        let [low, high] = at.index.0.to_le_bytes();
+        let [a, b, c, d] = data;
+        Command([code, low, high, at.sub.0, a, b, c, d])
+    }
+
+    /// A command that says nothing else, but for the toggle bit where it has
+    /// one.
+    pub const fn bare(code: u8, toggle: bool) -> Command {
+        let toggle = if toggle { TOGGLE } else { 0 };
+        Command([code | toggle, 0, 0, 0, 0, 0, 0, 0])
+    }
+
+    /// The end of a transfer by either side (CiA 301, 7.2.4.3.17).
+    pub const fn abort(at: Address, code: AbortCode) -> Command {
+        Command::addressed(Request::Abort.code(), at, code.0.to_le_bytes())
+    }
+
+    /// An initiate with all its data; `None` unless these are 1..=4 bytes
+    /// (CiA 301, 7.2.4.3.3, 7.2.4.3.6).
+    pub fn expedited(code: u8, at: Address, data: &[u8]) -> Option<Command> {
         if data.is_empty() {
             return None;
         }
         let mut bytes = [0; EXPEDITED_MAX];
         bytes.get_mut(..data.len())?.copy_from_slice(data);
-        Some(Initiate::Expedited {
-            data: bytes,
-            len: Some(data.len() as u8),
-        })
+        let unused = (EXPEDITED_MAX - data.len()) as u8;
+        let code = code | EXPEDITED | SIZE_TOLD | unused << EXPEDITED_UNUSED_SHIFT;
+        Some(Command::addressed(code, at, bytes))
     }
 
-    fn parse(bytes: Bytes) -> Initiate {
-        let [command, _, _, _, a, b, c, d] = bytes;
-        let told = command & SIZE_TOLD != 0;
-        if command & EXPEDITED == 0 {
-            let size = told.then(|| u32::from_le_bytes([a, b, c, d]));
-            return Initiate::Segmented { size };
-        }
-        let len = told.then_some(EXPEDITED_MAX as u8 - ((command >> 2) & 0x03));
-        let mut data = [a, b, c, d];
-        for byte in data.iter_mut().skip(len.map_or(EXPEDITED_MAX, usize::from)) {
-            *byte = 0;
-        }
-        Initiate::Expedited { data, len }
+    /// An initiate that segments follow, of this many bytes in all if told
+    /// (CiA 301, 7.2.4.3.3, 7.2.4.3.6).
+    pub fn segmented(code: u8, at: Address, size: Option<u32>) -> Command {
+        let told = if size.is_some() { SIZE_TOLD } else { 0 };
+        Command::addressed(code | told, at, size.unwrap_or(0).to_le_bytes())
     }
 
-    fn emit(self, specifier: u8, at: Address) -> Bytes {
-        let (flags, data) = match self {
-            Initiate::Expedited { data, len: None } => (EXPEDITED, data),
-            Initiate::Expedited {
-                data,
-                len: Some(len),
-            } => {
-                let unused = (EXPEDITED_MAX as u8).saturating_sub(len) & 0x03;
-                (EXPEDITED | SIZE_TOLD | unused << 2, data)
-            }
-            Initiate::Segmented { size: None } => (0, [0; 4]),
-            Initiate::Segmented { size: Some(size) } => (SIZE_TOLD, size.to_le_bytes()),
-        };
-        addressed(specifier << SPECIFIER_SHIFT | flags, at, data)
+    /// A segment; `None` if `data` has more than seven bytes
+    /// (CiA 301, 7.2.4.3.4, 7.2.4.3.7).
+    pub fn segment(code: u8, toggle: bool, last: bool, data: &[u8]) -> Option<Command> {
+        let Command(mut bytes) = Command::bare(code, toggle);
+        let [head, space @ ..] = &mut bytes;
+        space.get_mut(..data.len())?.copy_from_slice(data);
+        let unused = (SEGMENT_MAX - data.len()) as u8;
+        *head |= unused << UNUSED_SHIFT | u8::from(last);
+        Some(Command(bytes))
+    }
+
+    /// The initiate of a block transfer by the side that sends the data and
+    /// computes the CRC, of this many bytes in all if told
+    /// (CiA 301, 7.2.4.3.9, 7.2.4.3.13).
+    pub fn block_of(code: u8, at: Address, size: Option<u32>) -> Command {
+        let told = if size.is_some() { block::SIZE_TOLD } else { 0 };
+        let code = code | block::CRC | told;
+        Command::addressed(code, at, size.unwrap_or(0).to_le_bytes())
+    }
+
+    /// The initiate of a block transfer by the side that receives the data and
+    /// checks the CRC; blocks are to have `block_size` segments
+    /// (CiA 301, 7.2.4.3.9, 7.2.4.3.13).
+    pub const fn block_for(code: u8, at: Address, block_size: u8) -> Command {
+        Command::addressed(code | block::CRC, at, [block_size, 0, 0, 0])
+    }
+
+    /// The segments of a block up to `sequence` have come, 0 for none; the next
+    /// is to have `block_size` (CiA 301, 7.2.4.3.10, 7.2.4.3.14).
+    pub const fn acknowledge(code: u8, sequence: u8, block_size: u8) -> Command {
+        Command([code, sequence, block_size, 0, 0, 0, 0, 0])
+    }
+
+    /// The end of the data of a block transfer (CiA 301, 7.2.4.3.11,
+    /// 7.2.4.3.15).
+    pub const fn block_end(code: u8, end: End) -> Command {
+        let [low, high] = end.crc.to_le_bytes();
+        let unused = (end.unused & UNUSED_MASK) << block::UNUSED_SHIFT;
+        Command([code | unused, low, high, 0, 0, 0, 0, 0])
     }
 }
 
-/// One segment of up to seven bytes (CiA 301, 7.2.4.3.4, 7.2.4.3.7).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Segment {
-    /// Alternates, starting with `false`.
-    pub toggle: bool,
+/// Taking them apart.
+impl Command {
+    /// What a client wants; `None` for a command that does not exist.
+    pub const fn request(&self) -> Option<Request> {
+        Request::of(self.head())
+    }
+
+    /// What a server answers; `None` for a command that does not exist.
+    pub const fn answer(&self) -> Option<Answer> {
+        Answer::of(self.head())
+    }
+
+    const fn head(&self) -> u8 {
+        let [head, ..] = self.0;
+        head
+    }
+
+    const fn has(&self, flag: u8) -> bool {
+        self.head() & flag != 0
+    }
+
+    /// The entry, of a command that names one.
+    pub const fn address(&self) -> Address {
+        let [_, low, high, sub, ..] = self.0;
+        Address {
+            index: Index(u16::from_le_bytes([low, high])),
+            sub: SubIndex(sub),
+        }
+    }
+
+    /// The last four bytes: the data of an expedited transfer, for instance.
+    pub const fn tail(&self) -> [u8; 4] {
+        let [.., a, b, c, d] = self.0;
+        [a, b, c, d]
+    }
+
+    /// Why a transfer is aborted.
+    pub const fn abort_code(&self) -> AbortCode {
+        AbortCode(u32::from_le_bytes(self.tail()))
+    }
+
+    /// The toggle bit.
+    pub const fn toggle(&self) -> bool {
+        self.has(TOGGLE)
+    }
+
+    /// An initiate has its data with it, else segments follow.
+    pub const fn is_expedited(&self) -> bool {
+        self.has(EXPEDITED)
+    }
+
+    /// How many bytes an initiate announces. Of those that it has with it, all
+    /// that the type needs count if it does not tell.
+    pub fn size(&self) -> Option<u32> {
+        if !self.has(SIZE_TOLD) {
+            None
+        } else if self.is_expedited() {
+            let unused = self.head() >> EXPEDITED_UNUSED_SHIFT & EXPEDITED_UNUSED_MASK;
+            Some(EXPEDITED_MAX as u32 - u32::from(unused))
+        } else {
+            Some(u32::from_le_bytes(self.tail()))
+        }
+    }
+
     /// No segment follows.
-    pub last: bool,
-    len: u8,
-    data: [u8; SEGMENT_MAX],
-}
-
-impl Segment {
-    /// `None` if `data` has more than seven bytes.
-    pub fn new(toggle: bool, last: bool, data: &[u8]) -> Option<Segment> {
-        let mut bytes = [0; SEGMENT_MAX];
-        bytes.get_mut(..data.len())?.copy_from_slice(data);
-        Some(Segment {
-            toggle,
-            last,
-            len: data.len() as u8,
-            data: bytes,
-        })
+    pub const fn is_last(&self) -> bool {
+        self.has(LAST)
     }
 
-    /// The 0..=7 data bytes.
+    /// The 0..=7 data bytes of a segment.
     pub fn data(&self) -> &[u8] {
-        self.data.get(..usize::from(self.len)).unwrap_or(&[])
+        let [head, data @ ..] = &self.0;
+        let unused = usize::from(head >> UNUSED_SHIFT & UNUSED_MASK);
+        data.get(..SEGMENT_MAX - unused).unwrap_or(&[])
     }
 
-    /// Neither data nor the end: a transfer of such segments would never end.
-    pub(super) const fn is_fruitless(&self) -> bool {
-        self.len == 0 && !self.last
+    /// A segment with neither data nor the end: a transfer of such segments
+    /// would never end.
+    pub(super) fn is_fruitless(&self) -> bool {
+        self.data().is_empty() && !self.is_last()
     }
 
-    fn parse(bytes: Bytes) -> Segment {
-        let [command, data @ ..] = bytes;
-        let len = SEGMENT_MAX as u8 - ((command >> 1) & 0x07);
-        let mut data = data;
-        for byte in data.iter_mut().skip(usize::from(len)) {
-            *byte = 0;
+    /// The other side of a block transfer computes the CRC.
+    pub const fn has_crc(&self) -> bool {
+        self.has(block::CRC)
+    }
+
+    /// How many bytes the initiate of a block transfer announces.
+    pub fn block_data(&self) -> Option<u32> {
+        self.has(block::SIZE_TOLD)
+            .then_some(u32::from_le_bytes(self.tail()))
+    }
+
+    /// What an acknowledgement says: the last segment received in sequence, and
+    /// how many the next block is to have.
+    pub const fn acknowledged(&self) -> (u8, u8) {
+        let [_, sequence, block_size, ..] = self.0;
+        (sequence, block_size)
+    }
+
+    /// What the end command says of the data.
+    pub const fn end(&self) -> End {
+        let [head, low, high, ..] = self.0;
+        End {
+            unused: head >> block::UNUSED_SHIFT & UNUSED_MASK,
+            crc: u16::from_le_bytes([low, high]),
         }
-        Segment {
-            toggle: command & TOGGLE != 0,
-            last: command & LAST != 0,
-            len,
-            data,
-        }
-    }
-
-    fn emit(self, specifier: u8) -> Bytes {
-        let unused = (SEGMENT_MAX as u8).saturating_sub(self.len);
-        let command = specifier << SPECIFIER_SHIFT
-            | toggle_bit(self.toggle)
-            | unused << 1
-            | u8::from(self.last);
-        let [a, b, c, d, e, f, g] = self.data;
-        [command, a, b, c, d, e, f, g]
     }
 }
 
@@ -208,58 +298,4 @@ impl BlockSegment {
         let head = last | (self.sequence & block::SEQUENCE_MASK);
         [head, a, b, c, d, e, f, g]
     }
-}
-
-/// Index and sub-index in bytes 1..=3.
-pub(super) const fn address(bytes: Bytes) -> Address {
-    let [_, low, high, sub, ..] = bytes;
-    Address {
-        index: Index(u16::from_le_bytes([low, high])),
-        sub: SubIndex(sub),
-    }
-}
-
-/// The number in bytes 4..=7.
-const fn tail(bytes: Bytes) -> u32 {
-    let [.., a, b, c, d] = bytes;
-    u32::from_le_bytes([a, b, c, d])
-}
-
-const fn addressed(command: u8, at: Address, data: [u8; 4]) -> Bytes {
-    let [low, high] = at.index.0.to_le_bytes();
-    let [a, b, c, d] = data;
-    [command, low, high, at.sub.0, a, b, c, d]
-}
-
-const fn bare(command: u8) -> Bytes {
-    [command, 0, 0, 0, 0, 0, 0, 0]
-}
-
-const fn toggle_bit(toggle: bool) -> u8 {
-    if toggle { TOGGLE } else { 0 }
-}
-
-const fn crc_bit(crc: bool) -> u8 {
-    if crc { block::CRC } else { 0 }
-}
-
-fn block_initiate(specifier: u8, at: Address, crc: bool, size: Option<u32>) -> Bytes {
-    let told = if size.is_some() { block::SIZE_TOLD } else { 0 };
-    addressed(
-        specifier << SPECIFIER_SHIFT | crc_bit(crc) | told,
-        at,
-        size.unwrap_or(0).to_le_bytes(),
-    )
-}
-
-const fn block_end(specifier: u8, unused: u8, crc: u16) -> Bytes {
-    let unused = (unused & block::UNUSED_MASK) << block::UNUSED_SHIFT;
-    let [low, high] = crc.to_le_bytes();
-    let command = specifier << SPECIFIER_SHIFT | unused | block::END;
-    [command, low, high, 0, 0, 0, 0, 0]
-}
-
-const fn block_acknowledge(specifier: u8, sequence: u8, block_size: u8) -> Bytes {
-    let command = specifier << SPECIFIER_SHIFT | block::ACKNOWLEDGE;
-    [command, sequence, block_size, 0, 0, 0, 0, 0]
 }

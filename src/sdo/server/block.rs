@@ -2,60 +2,28 @@
 
 use super::transfer::{Sink, Source};
 use super::{Phase, Reply, Server, State};
-use crate::id::Address;
 use crate::od::ObjectDictionary;
 use crate::sdo::AbortCode;
-use crate::sdo::block::{End, Receiver, Sender, check_block_size};
-use crate::sdo::command::{Answer, BlockSegment, Bytes, Request, SEGMENT_MAX};
+use crate::sdo::block::{Receiver, Sender, check_block_size};
+use crate::sdo::command::{Answer, BlockSegment, Command, End, Request, SEGMENT_MAX};
 use crate::time::Instant;
 
 impl Server {
-    /// A request of a block transfer, other than a segment.
-    pub(super) fn serve_block(
-        &mut self,
-        request: Request,
-        od: &mut impl ObjectDictionary,
-    ) -> Reply {
-        match request {
-            Request::BlockDownload { at, crc, size } => self.block_download(at, crc, size, od),
-            Request::BlockDownloadEnd { unused, crc } => {
-                self.block_download_end(End { unused, crc }, od)
-            }
-            Request::BlockUpload {
-                at,
-                crc,
-                block_size,
-                protocol_switch,
-            } => self.block_upload(at, crc, block_size, protocol_switch, od),
-            Request::BlockUploadStart => self.block_upload_start(),
-            Request::BlockUploadAcknowledge {
-                sequence,
-                block_size,
-            } => self.block_upload_acknowledge(sequence, block_size),
-            Request::BlockUploadEnd => self.block_upload_end(),
-            _ => Err(AbortCode::COMMAND),
-        }
-    }
-
     /// CiA 301, 7.2.4.3.9.
-    fn block_download(
+    pub(super) fn block_download(
         &mut self,
-        at: Address,
-        crc: bool,
-        size: Option<u32>,
+        command: Command,
         od: &mut impl ObjectDictionary,
     ) -> Reply {
+        let at = command.address();
         let block_size = check_block_size(self.block_size).map_err(|_| AbortCode::COMMAND)?;
         self.state = State::BlockDownload {
-            sink: Sink::open(od, at, size)?,
-            receiver: Receiver::new(block_size, crc),
+            sink: Sink::open(od, at, command.block_data())?,
+            receiver: Receiver::new(block_size, command.has_crc()),
             refused: None,
         };
-        Ok(Some(Answer::BlockDownload {
-            at,
-            crc: true,
-            block_size,
-        }))
+        let code = Answer::BlockDownload.code();
+        Ok(Some(Command::block_for(code, at, block_size)))
     }
 
     /// While a block is being received a frame has no command specifier, except
@@ -69,7 +37,7 @@ impl Server {
     /// CiA 301, 7.2.4.3.10.
     pub(super) fn block_segment(
         &mut self,
-        bytes: Bytes,
+        command: Command,
         od: &mut impl ObjectDictionary,
     ) -> Option<Reply> {
         let State::BlockDownload {
@@ -83,9 +51,9 @@ impl Server {
         if receiver.is_complete() {
             return None;
         }
-        let Some(segment) = BlockSegment::decode(bytes) else {
-            return match (Request::decode(bytes), *refused) {
-                (Some(Request::Abort { .. }), _) => None,
+        let Some(segment) = BlockSegment::decode(command.0) else {
+            return match (command.request(), *refused) {
+                (Some(Request::Abort), _) => None,
                 (_, Some(code)) => Some(Err(code)),
                 (_, None) => {
                     *refused = Some(AbortCode::SEQUENCE_NUMBER);
@@ -99,10 +67,7 @@ impl Server {
                     *refused = sink.push(od, &data, false).err();
                 }
                 let over = receiver.over();
-                over.map(|sequence| Answer::BlockDownloadAcknowledge {
-                    sequence,
-                    block_size: receiver.block_size(),
-                })
+                over.map(|sequence| acknowledge(sequence, receiver))
             }
             Err(code) => return Some(Err(code)),
         };
@@ -113,28 +78,27 @@ impl Server {
     }
 
     /// CiA 301, 7.2.4.3.11.
-    fn block_download_end(&mut self, end: End, od: &mut impl ObjectDictionary) -> Reply {
+    pub(super) fn block_download_end(&mut self, end: End, od: &mut impl ObjectDictionary) -> Reply {
         let State::BlockDownload { sink, receiver, .. } = &mut self.state else {
             return Err(AbortCode::COMMAND);
         };
         let (data, len) = receiver.end(end)?;
         sink.push(od, data.get(..len).unwrap_or(&data), true)?;
         self.state = State::Idle;
-        Ok(Some(Answer::BlockDownloadEnd))
+        Ok(Some(Command::bare(Answer::BlockDownloadEnd.code(), false)))
     }
 
     /// CiA 301, 7.2.4.3.13.
-    fn block_upload(
+    pub(super) fn block_upload(
         &mut self,
-        at: Address,
-        crc: bool,
-        block_size: u8,
-        protocol_switch: u8,
+        command: Command,
         od: &mut impl ObjectDictionary,
     ) -> Reply {
         if self.block_size == 0 {
             return Err(AbortCode::COMMAND);
         }
+        let at = command.address();
+        let [block_size, protocol_switch, ..] = command.tail();
         let block_size = check_block_size(block_size)?;
         let source = Source::open(od, at)?;
         let size = source.read(od, 0, &mut [0])?.size;
@@ -143,18 +107,15 @@ impl Server {
         }
         self.state = State::BlockUpload {
             source,
-            sender: Sender::new(block_size, crc),
+            sender: Sender::new(block_size, command.has_crc()),
             phase: Phase::Start,
         };
-        Ok(Some(Answer::BlockUpload {
-            at,
-            crc: true,
-            size,
-        }))
+        let code = Answer::BlockUpload.code();
+        Ok(Some(Command::block_of(code, at, size)))
     }
 
     /// CiA 301, 7.2.4.3.13.
-    fn block_upload_start(&mut self) -> Reply {
+    pub(super) fn block_upload_start(&mut self) -> Reply {
         match &mut self.state {
             State::BlockUpload { phase, .. } if *phase == Phase::Start => {
                 *phase = Phase::Segments;
@@ -165,13 +126,13 @@ impl Server {
     }
 
     /// CiA 301, 7.2.4.3.14.
-    fn block_upload_acknowledge(&mut self, sequence: u8, block_size: u8) -> Reply {
+    pub(super) fn block_upload_acknowledge(&mut self, command: Command) -> Reply {
         match &mut self.state {
             State::BlockUpload { sender, phase, .. } if *phase == Phase::Segments => {
-                let end = sender.acknowledged(sequence, block_size)?;
-                Ok(end.map(|End { unused, crc }| {
+                let end = sender.acknowledged(command)?;
+                Ok(end.map(|end| {
                     *phase = Phase::End;
-                    Answer::BlockUploadEnd { unused, crc }
+                    Command::block_end(Answer::BlockUploadEnd.code(), end)
                 }))
             }
             _ => Err(AbortCode::COMMAND),
@@ -179,7 +140,7 @@ impl Server {
     }
 
     /// CiA 301, 7.2.4.3.15.
-    fn block_upload_end(&mut self) -> Reply {
+    pub(super) fn block_upload_end(&mut self) -> Reply {
         match &self.state {
             State::BlockUpload { phase, .. } if *phase == Phase::End => {
                 self.state = State::Idle;
@@ -191,12 +152,8 @@ impl Server {
 
     /// At its deadline a block upload sends the next segment, and a block
     /// download acknowledges what it has, once, so that the rest is sent again.
-    pub(super) fn block_poll(
-        &mut self,
-        now: Instant,
-        od: &mut impl ObjectDictionary,
-    ) -> Result<Option<Bytes>, AbortCode> {
-        let bytes = match &mut self.state {
+    pub(super) fn block_poll(&mut self, now: Instant, od: &mut impl ObjectDictionary) -> Reply {
+        let command = match &mut self.state {
             State::BlockUpload {
                 source,
                 sender,
@@ -205,7 +162,9 @@ impl Server {
                 Some(offset) => {
                     let mut data = [0; SEGMENT_MAX];
                     let chunk = source.read(od, offset, &mut data)?;
-                    Some(sender.segment(data, chunk.len, chunk.last)?.encode())
+                    Some(Command(
+                        sender.segment(data, chunk.len, chunk.last)?.encode(),
+                    ))
                 }
                 None => None,
             },
@@ -213,17 +172,17 @@ impl Server {
                 refused: Some(code),
                 ..
             } => return Err(*code),
-            State::BlockDownload { receiver, .. } => receiver.stall().map(|sequence| {
-                let block_size = receiver.block_size();
-                Answer::BlockDownloadAcknowledge {
-                    sequence,
-                    block_size,
-                }
-                .encode()
-            }),
+            State::BlockDownload { receiver, .. } => receiver
+                .stall()
+                .map(|sequence| acknowledge(sequence, receiver)),
             _ => None,
         };
         self.deadline = now + self.patience();
-        Ok(bytes)
+        Ok(command)
     }
+}
+
+const fn acknowledge(sequence: u8, receiver: &Receiver) -> Command {
+    let code = Answer::BlockDownloadAcknowledge.code();
+    Command::acknowledge(code, sequence, receiver.block_size())
 }

@@ -12,7 +12,7 @@ mod transfer;
 
 use super::abort::AbortCode;
 use super::block::{Receiver, Sender};
-use super::command::{Answer, BLOCK_MAX, Bytes, Request};
+use super::command::{BLOCK_MAX, Bytes, Command, Request};
 use crate::frame::Frame;
 use crate::id::{Address, CobId, FunctionCode, NodeId};
 use crate::od::ObjectDictionary;
@@ -71,7 +71,7 @@ enum Phase {
 }
 
 /// What the client is told, or nothing.
-type Reply = Result<Option<Answer>, AbortCode>;
+type Reply = Result<Option<Command>, AbortCode>;
 
 impl Server {
     /// The default server of `node`: requests on 600h + node-ID, answers on
@@ -135,12 +135,12 @@ impl Server {
         if now < self.deadline {
             return None;
         }
-        let bytes = match self.block_poll(now, od) {
-            Ok(Some(bytes)) => bytes,
+        let command = match self.block_poll(now, od) {
+            Ok(Some(command)) => command,
             Ok(None) => self.abort(at, AbortCode::TIMEOUT, od),
             Err(code) => self.abort(at, code, od),
         };
-        Some(Frame::full(self.response, bytes))
+        Some(Frame::full(self.response, command.0))
     }
 
     /// Serves a frame. Frames for others and frames without eight bytes are
@@ -154,41 +154,51 @@ impl Server {
         if frame.id() != self.request || frame.data().len() != size_of::<Bytes>() {
             return None;
         }
-        let bytes = frame.padded();
+        let command = Command(frame.padded());
         let mut at = self.address();
-        let reply = match self.block_segment(bytes, od) {
+        let reply = match self.block_segment(command, od) {
             Some(reply) => reply,
             None => {
+                let request = command.request();
                 // An initiate names its entry; everything else belongs to the
                 // transfer that is under way.
-                at = match Request::decode(bytes) {
-                    Some(request) => request.address().or(at),
-                    None => at.or(Some(super::command::address(bytes))),
-                };
-                self.serve(bytes, od)
+                if request.map_or(at.is_none(), Request::is_addressed) {
+                    at = Some(command.address());
+                }
+                self.serve(request, command, od)
             }
         };
         self.deadline = now + self.patience();
-        let bytes = match reply {
-            Ok(answer) => answer?.encode(),
+        let answer = match reply {
+            Ok(answer) => answer?,
             Err(code) => self.abort(at.unwrap_or(NOWHERE), code, od),
         };
-        Some(Frame::full(self.response, bytes))
+        Some(Frame::full(self.response, answer.0))
     }
 
-    fn serve(&mut self, bytes: Bytes, od: &mut impl ObjectDictionary) -> Reply {
-        let request = Request::decode(bytes).ok_or(AbortCode::COMMAND)?;
-        if request.address().is_some() {
+    fn serve(
+        &mut self,
+        request: Option<Request>,
+        command: Command,
+        od: &mut impl ObjectDictionary,
+    ) -> Reply {
+        let request = request.ok_or(AbortCode::COMMAND)?;
+        if request.is_addressed() {
             // An initiate, or an abort: the transfer under way is over.
             self.reset(od);
         }
         match request {
-            Request::Download { at, data } => self.download(at, data, od),
-            Request::Upload { at } => self.upload(at, od),
-            Request::DownloadSegment(segment) => self.download_segment(segment, od),
-            Request::UploadSegment { toggle } => self.upload_segment(toggle, od),
-            Request::Abort { .. } => Ok(None),
-            request => self.serve_block(request, od),
+            Request::Download => self.download(command, od),
+            Request::Upload => self.upload(command.address(), od),
+            Request::DownloadSegment => self.download_segment(command, od),
+            Request::UploadSegment => self.upload_segment(command.toggle(), od),
+            Request::BlockDownload => self.block_download(command, od),
+            Request::BlockDownloadEnd => self.block_download_end(command.end(), od),
+            Request::BlockUpload => self.block_upload(command, od),
+            Request::BlockUploadStart => self.block_upload_start(),
+            Request::BlockUploadAcknowledge => self.block_upload_acknowledge(command),
+            Request::BlockUploadEnd => self.block_upload_end(),
+            Request::Abort => Ok(None),
         }
     }
 
@@ -205,9 +215,9 @@ impl Server {
         }
     }
 
-    fn abort(&mut self, at: Address, code: AbortCode, od: &mut impl ObjectDictionary) -> Bytes {
+    fn abort(&mut self, at: Address, code: AbortCode, od: &mut impl ObjectDictionary) -> Command {
         self.reset(od);
-        Answer::Abort { at, code }.encode()
+        Command::abort(at, code)
     }
 
     /// The entry of the transfer under way.

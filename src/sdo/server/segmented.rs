@@ -5,64 +5,58 @@ use super::{Reply, Server, State};
 use crate::id::Address;
 use crate::od::ObjectDictionary;
 use crate::sdo::AbortCode;
-use crate::sdo::command::{Answer, EXPEDITED_MAX, Initiate, SEGMENT_MAX, Segment};
+use crate::sdo::command::{Answer, Command, EXPEDITED_MAX, SEGMENT_MAX};
 
 impl Server {
     /// CiA 301, 7.2.4.3.3.
-    pub(super) fn download(
-        &mut self,
-        at: Address,
-        data: Initiate,
-        od: &mut impl ObjectDictionary,
-    ) -> Reply {
-        match data {
-            Initiate::Expedited { data, len } => {
-                let mut sink = Sink::open(od, at, len.map(u32::from))?;
-                // Without a length the type decides.
-                let len = match (len, sink.fixed_size()) {
-                    (Some(len), _) => usize::from(len),
-                    (None, Some(size)) if size > EXPEDITED_MAX => {
-                        return Err(AbortCode::TOO_SHORT);
-                    }
-                    (None, Some(size)) => size,
-                    (None, None) => EXPEDITED_MAX,
-                };
-                sink.push(od, data.get(..len).unwrap_or(&data), true)
-                    .inspect_err(|_| sink.cancel(od))?;
-            }
-            Initiate::Segmented { size } => {
-                self.state = State::Download {
-                    sink: Sink::open(od, at, size)?,
-                    toggle: false,
-                };
-            }
+    pub(super) fn download(&mut self, command: Command, od: &mut impl ObjectDictionary) -> Reply {
+        let (at, size) = (command.address(), command.size());
+        let mut sink = Sink::open(od, at, size)?;
+        if command.is_expedited() {
+            // Without a length the type decides.
+            let len = match (size, sink.fixed_size()) {
+                (Some(size), _) => size as usize,
+                (None, Some(size)) if size > EXPEDITED_MAX => {
+                    return Err(AbortCode::TOO_SHORT);
+                }
+                (None, Some(size)) => size,
+                (None, None) => EXPEDITED_MAX,
+            };
+            let data = command.tail();
+            sink.push(od, data.get(..len).unwrap_or(&data), true)
+                .inspect_err(|_| sink.cancel(od))?;
+        } else {
+            self.state = State::Download {
+                sink,
+                toggle: false,
+            };
         }
-        Ok(Some(Answer::Download { at }))
+        let code = Answer::Download.code();
+        Ok(Some(Command::addressed(code, at, [0; 4])))
     }
 
     /// CiA 301, 7.2.4.3.4.
     pub(super) fn download_segment(
         &mut self,
-        segment: Segment,
+        segment: Command,
         od: &mut impl ObjectDictionary,
     ) -> Reply {
         let State::Download { sink, toggle } = &mut self.state else {
             return Err(AbortCode::COMMAND);
         };
-        if segment.toggle != *toggle {
+        if segment.toggle() != *toggle {
             return Err(AbortCode::TOGGLE);
         }
         if segment.is_fruitless() {
             return Err(AbortCode::COMMAND);
         }
-        sink.push(od, segment.data(), segment.last)?;
+        sink.push(od, segment.data(), segment.is_last())?;
         *toggle = !*toggle;
-        if segment.last {
+        if segment.is_last() {
             self.state = State::Idle;
         }
-        Ok(Some(Answer::DownloadSegment {
-            toggle: segment.toggle,
-        }))
+        let code = Answer::DownloadSegment.code();
+        Ok(Some(Command::bare(code, segment.toggle())))
     }
 
     /// CiA 301, 7.2.4.3.6.
@@ -70,19 +64,19 @@ impl Server {
         let source = Source::open(od, at)?;
         let mut first = [0; EXPEDITED_MAX];
         let chunk = source.read(od, 0, &mut first)?;
-        let whole = first.get(..chunk.len).filter(|_| chunk.last);
-        let data = match whole.and_then(Initiate::expedited) {
-            Some(expedited) => expedited,
-            None => {
-                self.state = State::Upload {
-                    source,
-                    toggle: false,
-                    offset: 0,
-                };
-                Initiate::Segmented { size: chunk.size }
-            }
+        let code = Answer::Upload.code();
+        if chunk.last
+            && let Some(whole) = first.get(..chunk.len)
+            && let Some(answer) = Command::expedited(code, at, whole)
+        {
+            return Ok(Some(answer));
+        }
+        self.state = State::Upload {
+            source,
+            toggle: false,
+            offset: 0,
         };
-        Ok(Some(Answer::Upload { at, data }))
+        Ok(Some(Command::segmented(code, at, chunk.size)))
     }
 
     /// CiA 301, 7.2.4.3.7.
@@ -104,7 +98,8 @@ impl Server {
             return Err(AbortCode::GENERAL);
         }
         let data = data.get(..chunk.len).unwrap_or(&[]);
-        let segment = Segment::new(asked, chunk.last, data).ok_or(AbortCode::GENERAL)?;
+        let code = Answer::UploadSegment.code();
+        let segment = Command::segment(code, asked, chunk.last, data).ok_or(AbortCode::GENERAL)?;
         *toggle = !*toggle;
         *offset = offset
             .checked_add(chunk.len as u32)
@@ -112,6 +107,6 @@ impl Server {
         if chunk.last {
             self.state = State::Idle;
         }
-        Ok(Some(Answer::UploadSegment(segment)))
+        Ok(Some(segment))
     }
 }
