@@ -160,6 +160,9 @@ pub(crate) struct NewOptions {
 
 #[derive(Args, Clone, Debug)]
 pub(crate) struct CapacityOptions {
+    /// Also find it out with simulated drives on the bit-timed bus
+    #[arg(long)]
+    pub(crate) measure: bool,
     /// One JSON object on standard output and nothing else there
     #[arg(long)]
     pub(crate) json: bool,

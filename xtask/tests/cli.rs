@@ -86,6 +86,30 @@ fn capacity_prints_one_json_object_with_the_table_of_the_paper() {
 }
 
 #[test]
+fn measured_capacity_is_at_least_exact_and_near_what_was_counted() {
+    let assert = xtask().args(["capacity", "--measure", "--json"]).assert();
+    let assert = assert.code(0);
+    let object: Value = serde_json::from_slice(&assert.get_output().stdout).unwrap();
+    let rows = object["rows"].as_array().unwrap();
+    assert_eq!(rows.len(), 9);
+    for row in rows {
+        let figure = |name: &str| row[name].as_u64().unwrap();
+        for (measured, exact, counted) in [
+            ("sdo_measured", "sdo_exact", "sdo_counted"),
+            ("pdo_measured", "pdo_exact", "pdo_counted"),
+            (
+                "pdo_measured_uncapped",
+                "pdo_exact_uncapped",
+                "pdo_counted_uncapped",
+            ),
+        ] {
+            assert!(figure(measured) >= figure(exact), "{row}");
+            assert!(figure(measured).abs_diff(figure(counted)) <= 1, "{row}");
+        }
+    }
+}
+
+#[test]
 fn flash_without_probe_rs_says_how_to_install_it() {
     let assert = xtask().arg("flash").env("PATH", "").assert().code(1);
     let words = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();

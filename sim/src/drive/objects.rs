@@ -210,7 +210,7 @@ const PROFILE: &[Object] = &[
     rww(Object::rw(0x60FE, 1, Unsigned32, 0)),
     rww(Object::rw(0x60FF, 0, Integer32, 0)),
     Object::rw(0x6402, 0, Unsigned16, 10),
-    Object::ro(0x6502, 0, Unsigned32, 0x3A5),
+    Object::ro(0x6502, 0, Unsigned32, 0x3A5).pdo(),
 ];
 
 /// PDO parameters: 4 RPDOs of 3 + 13 entries, 4 TPDOs of 4 + 13 entries.
