@@ -31,16 +31,19 @@ fn sample() -> Machine {
     outcome.machine.expect("no problem, so a machine")
 }
 
-fn golden(name: &str) -> String {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("tests/golden")
-        .join(name);
-    std::fs::read_to_string(path).unwrap().replace("\r\n", "\n")
+fn golden() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/six_epos4.rs")
 }
 
+/// With UPDATE_GOLDEN set the file is written anew; it is compiled by the next run.
 #[test]
 fn the_generated_rust_is_the_golden_file() {
-    assert_eq!(rust(&sample(), "canmaster"), golden("six_epos4.rs"));
+    let generated = rust(&sample(), "canmaster");
+    if std::env::var_os("UPDATE_GOLDEN").is_some() {
+        std::fs::write(golden(), &generated).unwrap();
+    }
+    let text = std::fs::read_to_string(golden()).unwrap();
+    assert_eq!(generated, text.replace("\r\n", "\n"));
 }
 
 /// Everything of a network as text, in one order.
