@@ -22,12 +22,12 @@
 mod app {
     use crate::{
         axes::Axes,
+        configurator::Configurator,
         control::Control,
         counters::{self, Counts},
-        duties::{Silent, act, begin, follow, obey, order_boot, serve},
         filters::{self, Handler},
         leds,
-        log::{self, Log, News, UPTIME_MS},
+        log::{News, UPTIME_MS},
         own_node::{Order, OwnNode, Storage},
         report::{publish, tell},
         roll::{self, Task},
@@ -37,7 +37,6 @@ mod app {
         Frame,
         boot::NetworkBoot,
         design::{self, AXES},
-        device::MasterError,
         id::{CobId, FunctionCode},
         master::{
             self, AxisMap, Debounce, ExtendedClock, MasterOd, Put, Reception, Supervisor,
@@ -60,7 +59,7 @@ mod app {
     type EventQueue = Queue<GroupEvent, { design::LOG_QUEUE }>;
 
     pub(crate) static NETWORK: &Network = &sample::SIX_EPOS4;
-    static CLOCK: ExtendedClock = ExtendedClock::new();
+    pub(crate) static CLOCK: ExtendedClock = ExtendedClock::new();
 
     #[shared]
     struct Shared {
@@ -548,104 +547,12 @@ mod app {
         ],
         shared = [od, can_tx, tx_queue, control, commands]
     )]
-    async fn sdo_configurator(mut cx: sdo_configurator::Context) {
-        let local = cx.local;
+    async fn sdo_configurator(cx: sdo_configurator::Context) {
         let mut wake = wake::reader();
-        let mut log = Log::new(NETWORK);
-        log::started(*local.reset_cause);
-        let mut silent = Silent::default();
-        defmt::info!(
-            "silent for {=u32} ms, so that drives left running come to rest",
-            NETWORK.master.silence.as_millis()
-        );
-        let (boot, own) = (local.boot, local.own);
-        if *local.reset_cause == ResetCause::Watchdog {
-            own.device.raise(MasterError::Watchdog);
-        }
-        if local.store.is_none() {
-            defmt::warn!("settings are not stored (1010h): set option bit DBANK, then flash again");
-        }
-        begin(own, local.sync_period, local.orders_to, &mut cx.shared);
-        let mut transfer = None;
+        let mut configurator = Configurator::new(cx.local, cx.shared);
         loop {
-            let tested = transfer::go_on(
-                &mut transfer,
-                own.device.transfer(),
-                local.transfer_answers,
-                &mut cx.shared.tx_queue,
-                now(*local.clock),
-            );
-            while serve(
-                own,
-                boot,
-                local.store,
-                local.sync_period,
-                local.requests,
-                now(*local.clock),
-                &mut cx.shared,
-            ) {
-                while let Some(event) = own.device.take_event() {
-                    obey(
-                        &event,
-                        own,
-                        local.sync_period,
-                        local.orders_to,
-                        &mut cx.shared,
-                    );
-                    order_boot(&event, boot, own, now(*local.clock));
-                }
-            }
-            while let Some(news) = local.news.dequeue() {
-                // Who is just being booted has to be silent for a while.
-                if news.lost_node().is_none_or(|node| boot.node_lost(node)) {
-                    own.news(&news);
-                    log.news(&news);
-                }
-            }
-            while let Some(event) = local.events.dequeue() {
-                silent.group(&event, boot);
-                own.group(&event);
-                log.group(&event);
-            }
-            let bus_off = cx.shared.control.lock(|control| control.bus_off);
-            // The controller had the silent phase to come back in.
-            if bus_off && !boot.is_silent() {
-                boot.bus_off(now(*local.clock));
-            }
-            // A board that is stopped has neither SDO nor SYNC: the boot-up waits.
-            let held = own.device.state() == nmt::State::Stopped && !bus_off;
-            // The time first, then one frame at a time: each may cause several
-            // actions, which are carried out before the next.
-            loop {
-                while !held && let Some(action) = boot.poll(now(*local.clock)) {
-                    let period = &mut *local.sync_period;
-                    act(&action, own, period, &mut log, &mut cx.shared);
-                }
-                follow(boot, own, &mut cx.shared);
-                let state = || {
-                    local
-                        .states
-                        .dequeue()
-                        .inspect(|frame| own.error_control(frame))
-                };
-                let Some(frame) = local.answers.dequeue().or_else(state) else {
-                    break;
-                };
-                boot.on_frame(&frame, now(*local.clock));
-            }
-            roll::check_in(Task::SdoConfigurator);
-            let latest = now(*local.clock) + design::CONFIGURATOR_PERIOD;
-            let boots = boot.next_deadline().filter(|_| !held);
-            let mut next = latest;
-            for deadline in [boots, own.device.next_deadline(), tested] {
-                next = deadline.map_or(next, |deadline| deadline.min(next));
-            }
-            wake::at(next.as_micros() as u32);
+            configurator.round();
             wake.wait().await;
         }
-    }
-
-    fn now(clock: timers::Microseconds) -> Instant {
-        CLOCK.now(|| clock.now())
     }
 }

@@ -7,6 +7,8 @@ mod app;
 #[cfg(target_os = "none")]
 mod axes;
 #[cfg(target_os = "none")]
+mod configurator;
+#[cfg(target_os = "none")]
 mod control;
 #[cfg(target_os = "none")]
 mod counters;
