@@ -11,6 +11,8 @@ pub struct Instant(u64);
 impl Instant {
     /// The origin.
     pub const ZERO: Instant = Instant(0);
+    /// Later than everything: the deadline of what has none.
+    pub(crate) const NEVER: Instant = Instant(u64::MAX);
 
     /// `us` microseconds after the origin.
     pub const fn from_micros(us: u64) -> Instant {
@@ -22,6 +24,16 @@ impl Instant {
         self.0
     }
 
+    /// A deadline that may be none.
+    pub(crate) fn of(deadline: Option<Instant>) -> Instant {
+        deadline.unwrap_or(Instant::NEVER)
+    }
+
+    /// The deadline, unless there is none.
+    pub(crate) fn deadline(self) -> Option<Instant> {
+        (self != Instant::NEVER).then_some(self)
+    }
+
     /// The time since `earlier`; zero if `earlier` is later. Saturates at
     /// [`Duration::MAX`].
     pub const fn since(self, earlier: Instant) -> Duration {
@@ -31,15 +43,6 @@ impl Instant {
         } else {
             Duration(us as u32)
         }
-    }
-}
-
-/// The earlier of two deadlines of which each may be none.
-pub(crate) fn earliest(a: Option<Instant>, b: Option<Instant>) -> Option<Instant> {
-    match (a, b) {
-        (Some(a), Some(b)) => Some(if b < a { b } else { a }),
-        (a, None) => a,
-        (None, b) => b,
     }
 }
 

@@ -10,7 +10,7 @@ use super::settings::{Settings, Startup};
 use crate::frame::Frame;
 use crate::id::{CobId, FunctionCode, NodeId};
 use crate::network::Network;
-use crate::time::{Duration, Instant, earliest};
+use crate::time::{Duration, Instant};
 use core::mem::MaybeUninit;
 use heapless::{Deque, Vec};
 
@@ -22,13 +22,13 @@ const OUTBOX: usize = 4;
 /// NMT start is never sent while a mandatory node is not booted. A node that
 /// is lost later is taken through boot-up again while the others run on.
 #[derive(Debug)]
+#[repr(C)]
 pub struct NetworkBoot<const N: usize> {
-    pub(super) network: &'static Network,
-    pub(super) startup: Startup,
-    /// 1F89h; zero: for ever.
-    pub(super) boot_time: Duration,
-    pub(super) nodes: Vec<NodeBoot, N>,
+    // In this order, small ones first: instructions that reach the first 32 bytes
+    // are shorter.
     pub(super) phase: Phase,
+    /// Where bus-off leads back to, if the network was halted before.
+    pub(super) halted: Option<Phase>,
     /// Every mandatory node is operational, and that has been told.
     pub(super) ready: bool,
     /// The start came to its end once: a mandatory node that fails is waited for.
@@ -37,13 +37,18 @@ pub struct NetworkBoot<const N: usize> {
     pub(super) ordered: bool,
     /// Nodes without node-ID were or are looked for.
     pub(super) searched: bool,
-    pub(super) factory: Factory,
-    /// Where bus-off leads back to, if the network was halted before.
-    pub(super) halted: Option<Phase>,
-    pauses: Pauses,
+    pub(super) network: &'static Network,
+    pub(super) startup: Startup,
+    /// 1F89h; zero: for ever.
+    pub(super) boot_time: Duration,
+    /// The end of a phase that time alone leads out of.
+    pub(super) until: Instant,
     /// Where the last round over the nodes stopped, so that none starves.
     next: usize,
+    pauses: Pauses,
+    pub(super) factory: Factory,
     outbox: Deque<Action, OUTBOX>,
+    pub(super) nodes: Vec<NodeBoot, N>,
 }
 
 impl<const N: usize> NetworkBoot<N> {
@@ -93,14 +98,14 @@ impl<const N: usize> NetworkBoot<N> {
         settings: &Settings<N>,
         now: Instant,
     ) -> NetworkBoot<N> {
-        let until = now + network.master.silence;
         NetworkBoot {
             network,
             startup: settings.startup,
             boot_time: settings.boot_time,
+            until: now + network.master.silence,
             nodes: Vec::new(),
             phase: if settings.startup.has(Startup::MASTER) {
-                Phase::Silent { until }
+                Phase::Silent
             } else {
                 Phase::NotMaster
             },
@@ -121,7 +126,7 @@ impl<const N: usize> NetworkBoot<N> {
     /// changed only in the silent phase.
     pub fn set_settings(&mut self, settings: &Settings<N>) {
         self.startup = settings.startup;
-        if matches!(self.phase, Phase::Silent { .. }) && !self.startup.has(Startup::MASTER) {
+        if self.phase == Phase::Silent && !self.startup.has(Startup::MASTER) {
             self.phase = Phase::NotMaster;
         }
         self.boot_time = settings.boot_time;
@@ -143,7 +148,7 @@ impl<const N: usize> NetworkBoot<N> {
     /// Whether the master is to be silent, as after a reset and after bus-off:
     /// its heartbeat waits for the end.
     pub fn is_silent(&self) -> bool {
-        matches!(self.phase, Phase::Silent { .. } | Phase::BusOff { .. })
+        matches!(self.phase, Phase::Silent | Phase::BusOff)
     }
 
     /// Whether every mandatory node is checked, configured and operational.
@@ -160,9 +165,7 @@ impl<const N: usize> NetworkBoot<N> {
 
     /// Whether a node of the list was given up, or not seen in its boot time.
     pub fn any_given_up(&self) -> bool {
-        self.nodes
-            .iter()
-            .any(|node| node.has_given_up() && node.is(0))
+        self.any(|node| node.has_given_up() && node.is(0))
     }
 
     /// Whether a mandatory node failed in the start. Nothing leads out but a new
@@ -182,6 +185,7 @@ impl<const N: usize> NetworkBoot<N> {
 
     /// Takes in a frame from an SDO server, from error control or from an LSS
     /// slave; all others are left alone.
+    #[inline(never)]
     pub fn on_frame(&mut self, frame: &Frame, now: Instant) {
         if !self.phase.listens() {
             return;
@@ -197,7 +201,7 @@ impl<const N: usize> NetworkBoot<N> {
         let Some((function, id)) = frame.id().split() else {
             return;
         };
-        let Some(node) = self.nodes.iter_mut().find(|boot| boot.node().id == id) else {
+        let Some(node) = self.node_mut(id) else {
             return;
         };
         match function {
@@ -211,33 +215,29 @@ impl<const N: usize> NetworkBoot<N> {
     /// guarding: whoever consumes it tells so. `false`: it is being booted, and
     /// that is what it takes.
     pub fn node_lost(&mut self, id: NodeId) -> bool {
-        let mut nodes = self.nodes.iter_mut();
-        nodes
-            .find(|boot| boot.node().id == id)
-            .is_some_and(|node| node.lose(false))
+        self.node_mut(id).is_some_and(|node| node.lose(false))
     }
 
     /// The controller is bus-off. After a pause [`Action::RestartController`]
     /// comes, then the silent phase, and the nodes are booted again, unless the
     /// start was halted or another device is the master.
+    #[inline(never)]
     pub fn bus_off(&mut self, now: Instant) {
         let pause = self.pauses.next(now);
         self.halted = match self.phase {
             Phase::NotMaster | Phase::Failed | Phase::Stopped => Some(self.phase),
-            Phase::BusOff { .. } => self.halted,
+            Phase::BusOff => self.halted,
             _ => None,
         };
-        for node in &mut self.nodes {
-            node.halt();
-        }
-        self.phase = Phase::BusOff { until: now + pause };
+        self.until = now + pause;
         let pause_ms = pause.as_millis();
         self.report(Event::BusOff { pause_ms });
-        self.tell_ready();
+        self.halt(Phase::BusOff);
     }
 
     /// The next thing to do, if there is one now: to be called until it
     /// returns `None`, after every frame and at every deadline.
+    #[inline(never)]
     pub fn poll(&mut self, now: Instant) -> Option<Action> {
         if let Some(action) = self.outbox.pop_front() {
             return Some(action);
@@ -259,15 +259,37 @@ impl<const N: usize> NetworkBoot<N> {
     }
 
     /// When [`poll`](Self::poll) has to be called again at the latest.
+    #[inline(never)]
     pub fn next_deadline(&self) -> Option<Instant> {
-        let mut next = self.phase.deadline();
+        let mut next = Instant::NEVER;
+        if self.phase.is_timed() {
+            next = self.until;
+        }
         if self.phase.listens() {
-            next = earliest(next, self.factory.next_deadline());
+            next = next.min(Instant::of(self.factory.next_deadline()));
         }
         for node in &self.nodes {
-            next = earliest(next, node.next_deadline());
+            next = next.min(node.next_deadline());
         }
-        next
+        next.deadline()
+    }
+
+    /// Whether this is so of any node. Not inlined, here and below: the nodes are
+    /// gone through in many places.
+    #[inline(never)]
+    pub(super) fn any(&self, is: fn(&NodeBoot) -> bool) -> bool {
+        self.nodes.iter().any(is)
+    }
+
+    /// Whether this is so of all nodes.
+    #[inline(never)]
+    pub(super) fn all(&self, are: fn(&NodeBoot) -> bool) -> bool {
+        self.nodes.iter().all(are)
+    }
+
+    #[inline(never)]
+    pub(super) fn node_mut(&mut self, id: NodeId) -> Option<&mut NodeBoot> {
+        self.nodes.iter_mut().find(|boot| boot.node().id == id)
     }
 
     pub(super) fn report(&mut self, event: Event) {

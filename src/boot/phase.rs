@@ -1,7 +1,5 @@
 //! The phases of the network's start (CiA 302-2, "NMT start-up").
 
-use crate::time::Instant;
-
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Phase {
     /// Another device is the NMT master (1F80h, bit 0; CiA 302-2, "NMT
@@ -9,7 +7,7 @@ pub(super) enum Phase {
     NotMaster,
     /// Nothing is sent, so that drives left running miss the master's
     /// heartbeat and come to rest. Not of the standard: motion wants it.
-    Silent { until: Instant },
+    Silent,
     /// NMT reset communication is sent; the nodes boot, each at its own pace
     /// (CiA 302-2, "NMT start-up", "Reset communication" and "Boot slave").
     Booting,
@@ -18,7 +16,7 @@ pub(super) enum Phase {
     AwaitingOrder,
     /// SYNC runs; after a few of them the nodes are started (CiA 301, 7.2.5).
     /// Not of the standard: drives want to see the period first.
-    Synchronising { until: Instant },
+    Synchronising,
     /// NMT start is sent; every node has to report operational (CiA 302-2, "NMT
     /// start-up", "Start slaves"; 1F80h, bits 1 and 3).
     Starting,
@@ -31,20 +29,14 @@ pub(super) enum Phase {
     /// A mandatory node failed: the start is halted (CiA 302-2, "NMT start-up",
     /// "Halt").
     Failed,
-    /// The controller is bus-off until this moment (ISO 11898-1, fault
-    /// confinement).
-    BusOff { until: Instant },
+    /// The controller is bus-off (ISO 11898-1, fault confinement).
+    BusOff,
 }
 
 impl Phase {
-    /// When time alone leads out.
-    pub(super) const fn deadline(self) -> Option<Instant> {
-        match self {
-            Phase::Silent { until } | Phase::Synchronising { until } | Phase::BusOff { until } => {
-                Some(until)
-            }
-            _ => None,
-        }
+    /// Whether time alone leads out.
+    pub(super) const fn is_timed(self) -> bool {
+        matches!(self, Phase::Silent | Phase::Synchronising | Phase::BusOff)
     }
 
     /// Whether the nodes' frames are of interest.
@@ -53,7 +45,7 @@ impl Phase {
             self,
             Phase::Booting
                 | Phase::AwaitingOrder
-                | Phase::Synchronising { .. }
+                | Phase::Synchronising
                 | Phase::Starting
                 | Phase::Running
         )

@@ -45,6 +45,7 @@ impl<const N: usize> NetworkBoot<N> {
     ///
     /// # Errors
     /// As [`may_request`](Self::may_request); nothing was sent.
+    #[inline(never)]
     pub fn request(&mut self, control: NodeControl, now: Instant) -> Result<(), Refusal> {
         self.may_request(control)?;
         let NodeControl { command, target } = control;
@@ -60,7 +61,7 @@ impl<const N: usize> NetworkBoot<N> {
             }
             Target::Node(id) if is_reset(command) => {
                 let boot_time = self.boot_time;
-                for node in self.nodes.iter_mut().filter(|boot| boot.node().id == id) {
+                if let Some(node) = self.node_mut(id) {
                     node.reset_by_request(command, boot_time, now);
                 }
             }
@@ -83,7 +84,7 @@ impl<const N: usize> NetworkBoot<N> {
             _ if matches!(command, Command::Other(_)) => Refusal::UnknownCommand,
             (_, None) if !to_master => Refusal::UnknownNode,
             // The master does not speak.
-            (Phase::NotMaster | Phase::Silent { .. } | Phase::BusOff { .. }, _) => Refusal::Booting,
+            (Phase::NotMaster | Phase::Silent | Phase::BusOff, _) => Refusal::Booting,
             // This leads out of everything else.
             _ if to_all && is_reset(command) => return Ok(()),
             (Phase::Failed | Phase::Stopped, _) => Refusal::Halted,
@@ -98,9 +99,7 @@ impl<const N: usize> NetworkBoot<N> {
             }
             // A stopped node has no SDO: its boot-up would fail.
             (Phase::Running, Some(_))
-                if to_all
-                    && command == Command::Stop
-                    && !self.nodes.iter().all(NodeBoot::is_settled) =>
+                if to_all && command == Command::Stop && !self.all(NodeBoot::is_settled) =>
             {
                 Refusal::Booting
             }

@@ -10,14 +10,15 @@ use crate::nmt::{Command, NodeControl};
 use crate::time::{Duration, Instant};
 
 impl<const N: usize> NetworkBoot<N> {
+    #[inline(never)]
     pub(super) fn advance(&mut self, now: Instant) {
         match self.phase {
-            Phase::Silent { until } if now >= until => self.reset_all(now),
-            Phase::BusOff { until } if now >= until => {
+            Phase::Silent if now >= self.until => self.reset_all(now),
+            Phase::BusOff if now >= self.until => {
                 self.push(Action::RestartController);
                 self.report(Event::BusRestarted);
-                let until = now + self.network.master.silence;
-                self.phase = self.halted.unwrap_or(Phase::Silent { until });
+                self.until = now + self.network.master.silence;
+                self.phase = self.halted.unwrap_or(Phase::Silent);
             }
             phase => {
                 if phase.listens() && !self.search(now) {
@@ -31,8 +32,8 @@ impl<const N: usize> NetworkBoot<N> {
     fn advance_start(&mut self, now: Instant) {
         match self.phase {
             Phase::Booting => self.finish_booting(now),
-            Phase::Synchronising { until } if now >= until => self.start(now),
-            Phase::Starting if !self.nodes.iter().any(NodeBoot::is_starting) => {
+            Phase::Synchronising if now >= self.until => self.start(now),
+            Phase::Starting if !self.any(NodeBoot::is_starting) => {
                 if self.mandatory_failed() && !self.ran {
                     self.fail();
                 } else {
@@ -53,8 +54,7 @@ impl<const N: usize> NetworkBoot<N> {
 
     /// Whoever is to be kept alive is reset only if it turns out not to run.
     pub(super) fn reset_all(&mut self, now: Instant) {
-        let kept = |boot: &NodeBoot| boot.is(Assignment::KEEP_ALIVE);
-        let alone = self.nodes.iter().any(kept);
+        let alone = self.any(|boot| boot.is(Assignment::KEEP_ALIVE));
         if !alone {
             self.broadcast(Command::ResetCommunication);
         }
@@ -77,7 +77,7 @@ impl<const N: usize> NetworkBoot<N> {
     /// to send.
     fn search(&mut self, now: Instant) -> bool {
         if !self.searched {
-            if !self.nodes.iter().any(NodeBoot::is_missing) {
+            if !self.any(NodeBoot::is_missing) {
                 return false;
             }
             self.searched = true;
@@ -105,9 +105,10 @@ impl<const N: usize> NetworkBoot<N> {
     #[inline(never)]
     pub(super) fn found(&mut self, event: Event, now: Instant) {
         if let Event::IdGiven { node, .. } = event
-            && let Some(node) = self.nodes.iter_mut().find(|boot| boot.node().id == node)
+            && let boot_time = self.boot_time
+            && let Some(node) = self.node_mut(node)
         {
-            node.await_boot_up(self.boot_time, now);
+            node.await_boot_up(boot_time, now);
         }
         self.report(event);
     }
@@ -115,7 +116,7 @@ impl<const N: usize> NetworkBoot<N> {
     /// All nodes are waited for even when one has failed, so that one run
     /// names everything that is wrong.
     fn finish_booting(&mut self, now: Instant) {
-        if !self.nodes.iter().all(NodeBoot::is_settled) {
+        if !self.all(NodeBoot::is_settled) {
             return;
         }
         if self.mandatory_up() {
@@ -134,9 +135,8 @@ impl<const N: usize> NetworkBoot<N> {
         self.push(Action::ProduceSync);
         let syncs = u32::from(self.network.master.syncs_before_start);
         let span = self.network.cycle.as_micros().saturating_mul(syncs);
-        self.phase = Phase::Synchronising {
-            until: now + Duration::from_micros(span),
-        };
+        self.until = now + Duration::from_micros(span);
+        self.phase = Phase::Synchronising;
     }
 
     fn start(&mut self, now: Instant) {
@@ -159,7 +159,7 @@ impl<const N: usize> NetworkBoot<N> {
     pub(super) fn send_start(&mut self, now: Instant) {
         let all = self.startup.has(Startup::START_ALL)
             && !self.nodes.is_empty()
-            && self.nodes.iter().all(NodeBoot::is_startable);
+            && self.all(NodeBoot::is_startable);
         if all {
             self.broadcast(Command::Start);
         }
@@ -172,7 +172,7 @@ impl<const N: usize> NetworkBoot<N> {
     /// handler"): as 1F80h says if the node is mandatory, else nothing.
     fn handle_lost(&mut self, now: Instant) {
         let error = |boot: &NodeBoot| boot.is_lost() && boot.is(Assignment::MANDATORY);
-        if self.phase == Phase::Running && self.nodes.iter().any(error) {
+        if self.phase == Phase::Running && self.any(error) {
             if self.startup.has(Startup::STOP_ALL) {
                 self.broadcast(Command::Stop);
                 self.report(Event::NetworkStopped);
@@ -188,15 +188,11 @@ impl<const N: usize> NetworkBoot<N> {
     }
 
     pub(super) fn mandatory_up(&self) -> bool {
-        self.nodes
-            .iter()
-            .all(|boot| boot.is_up() || !boot.is(Assignment::MANDATORY))
+        self.all(|boot| boot.is_up() || !boot.is(Assignment::MANDATORY))
     }
 
     fn mandatory_failed(&self) -> bool {
-        self.nodes
-            .iter()
-            .any(|boot| boot.has_given_up() && boot.is(Assignment::MANDATORY))
+        self.any(|boot| boot.has_given_up() && boot.is(Assignment::MANDATORY))
     }
 
     fn fail(&mut self) {
@@ -204,7 +200,7 @@ impl<const N: usize> NetworkBoot<N> {
         self.halt(Phase::Failed);
     }
 
-    fn halt(&mut self, phase: Phase) {
+    pub(super) fn halt(&mut self, phase: Phase) {
         for node in &mut self.nodes {
             node.halt();
         }
@@ -215,7 +211,7 @@ impl<const N: usize> NetworkBoot<N> {
     /// Tells when the network becomes ready, and when it ceases to be.
     pub(super) fn tell_ready(&mut self) {
         let complete = |boot: &NodeBoot| boot.is_complete() || !boot.is(Assignment::MANDATORY);
-        let ready = self.phase == Phase::Running && self.nodes.iter().all(complete);
+        let ready = self.phase == Phase::Running && self.all(complete);
         if ready == self.ready {
             return;
         }

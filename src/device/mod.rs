@@ -55,7 +55,7 @@ use crate::nmt::{NodeControl, Service, State, Target};
 use crate::od::Entry;
 use crate::sdo::{AbortCode, Server};
 use crate::sync::SyncLimits;
-use crate::time::{Duration, Instant, earliest};
+use crate::time::{Duration, Instant};
 use crate::time_of_day::{self, TimeOfDay};
 use dictionary::Dictionary;
 use node_record::Presence;
@@ -355,16 +355,14 @@ impl<const N: usize> Device<N> {
     /// it.
     pub fn next_deadline(&self) -> Option<Instant> {
         let state = self.dictionary.state;
-        let errors = self.dictionary.errors.next_deadline();
-        let time = self.time.next_deadline();
-        let mut next = self.server.next_deadline();
+        let mut next = Instant::of(self.server.next_deadline());
         if state.allows(Service::Emergency) {
-            next = earliest(next, errors);
+            next = next.min(Instant::of(self.dictionary.errors.next_deadline()));
         }
         if state.allows(Service::Time) {
-            next = earliest(next, time);
+            next = next.min(Instant::of(self.time.next_deadline()));
         }
-        next
+        next.deadline()
     }
 
     /// Whether TIME is produced, and how often.

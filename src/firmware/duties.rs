@@ -22,6 +22,7 @@ use rtic::Mutex;
 
 /// The board's own services: takes in one frame, sends one frame. `false`:
 /// there was neither.
+#[inline(never)]
 pub(crate) fn serve(
     own: &mut OwnNode,
     boot: &NetworkBoot<AXES>,
@@ -81,6 +82,7 @@ pub(crate) fn obey(
 
 /// Hands on what a client has caused to the boot-up, which sends all NMT
 /// commands at its next poll.
+#[inline(never)]
 pub(crate) fn order_boot(
     event: &Event,
     boot: &mut NetworkBoot<AXES>,
@@ -187,6 +189,7 @@ fn send(frame: Frame, shared: &mut Shared<'_>) {
 }
 
 /// Carries out what the boot-up asks for.
+#[inline(never)]
 pub(crate) fn act(
     action: &Action,
     own: &mut OwnNode,

@@ -159,6 +159,7 @@ impl Log {
     }
 
     /// A step of the boot-up.
+    #[inline(never)]
     pub(crate) fn boot(&mut self, event: &Event) {
         let level = match event {
             Event::Failed(..) => Level::Error,
@@ -174,6 +175,7 @@ impl Log {
     }
 
     /// What `network` had to say.
+    #[inline(never)]
     pub(crate) fn news(&mut self, news: &News) {
         let (level, words) = match news {
             News::Node(report) => return self.report(report),
@@ -217,6 +219,7 @@ impl Log {
     }
 
     /// What the group reports.
+    #[inline(never)]
     pub(crate) fn group(&mut self, event: &GroupEvent) {
         let (level, line) = match event {
             // The controller's state says more.

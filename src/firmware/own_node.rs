@@ -251,6 +251,7 @@ impl OwnNode {
     }
 
     /// A step of the boot-up.
+    #[inline(never)]
     pub(crate) fn boot(&mut self, event: &Event) {
         self.device.on_boot_event(event);
         if let Event::Failed(node, failure) = *event {
@@ -277,6 +278,7 @@ impl OwnNode {
     }
 
     /// What `network` had to say.
+    #[inline(never)]
     pub(crate) fn news(&mut self, news: &News) {
         match news {
             News::Node(report) => match report.notice {
@@ -330,6 +332,7 @@ impl OwnNode {
     }
 
     /// What the group reports.
+    #[inline(never)]
     pub(crate) fn group(&mut self, event: &GroupEvent) {
         if let GroupEvent::State { to, .. } = event
             && *to != GroupState::Faulted

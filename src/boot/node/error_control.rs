@@ -22,6 +22,7 @@ const START_TIME: Duration = Duration::from_millis(100);
 impl NodeBoot {
     /// The node reported its NMT state: a boot-up frame, a heartbeat or the
     /// answer to node guarding (CiA 301, 7.2.8.3.2).
+    #[inline(never)]
     pub(in super::super) fn on_error_control(&mut self, frame: &Frame, now: Instant) {
         let Some(ErrorControl { state, .. }) = ErrorControl::decode(frame) else {
             return;
@@ -186,9 +187,7 @@ impl NodeBoot {
     }
 
     fn attempt_end(&self, now: Instant) -> Instant {
-        let at_least = now + ATTEMPT;
-        self.boot_deadline
-            .map_or(at_least, |deadline| deadline.max(at_least))
+        self.boot_end(now).max(now + ATTEMPT)
     }
 
     /// Step 7, entered with the identity checked.

@@ -11,7 +11,7 @@ use crate::network::{self, Network, Node};
 use crate::nmt::{Command, Guardian, NodeControl};
 use crate::objects;
 use crate::sdo::Client;
-use crate::time::{Duration, Instant, earliest};
+use crate::time::{Duration, Instant};
 use heapless::Deque;
 use state::{AwaitBootUp, AwaitErrorControl, AwaitReset, GivenUp, Identify, Idle, Missing, State};
 
@@ -24,23 +24,14 @@ const ATTEMPT: Duration = Duration::from_millis(1_000);
 
 /// The boot-up of one node, and the SDO channel to it.
 #[derive(Debug)]
+#[repr(C)]
 pub(super) struct NodeBoot {
-    network: &'static Network,
-    node: &'static Node,
-    settings: NodeSettings,
-    client: Client,
-    state: State,
-    /// End of the boot time 1F89h; `None`: for ever.
-    boot_deadline: Option<Instant>,
-    /// Asks the node for its state, if it has no heartbeat.
-    guardian: Guardian,
+    // In this order, small ones first: instructions that reach the first 32 bytes
+    // are shorter.
     /// Tries of the request under way.
     tries: u8,
     /// Restarts in the middle of the boot-up.
     restarts: u8,
-    /// Writes of the configuration without date and time.
-    planned: u16,
-    result: BootResult,
     /// It failed, and was not booted since.
     gave_up: bool,
     /// It booted since the boot-up began, so that nothing of old runs on.
@@ -51,6 +42,18 @@ pub(super) struct NodeBoot {
     held: bool,
     /// If it does not boot, it may be looked for by its serial number.
     search: bool,
+    /// Writes of the configuration without date and time.
+    planned: u16,
+    node: &'static Node,
+    settings: NodeSettings,
+    state: State,
+    network: &'static Network,
+    result: BootResult,
+    /// End of the boot time 1F89h, which may be [`Instant::NEVER`].
+    boot_deadline: Instant,
+    client: Client,
+    /// Asks the node for its state, if it has no heartbeat.
+    guardian: Guardian,
     outbox: Deque<Action, OUTBOX>,
 }
 
@@ -66,7 +69,7 @@ impl NodeBoot {
             settings,
             client: Client::new(node.id, node.sdo_timeout),
             state: State::Idle(Idle),
-            boot_deadline: None,
+            boot_deadline: Instant::NEVER,
             guardian: Guardian::new(node.id, Duration::ZERO, 0),
             tries: 0,
             restarts: 0,
@@ -165,7 +168,7 @@ impl NodeBoot {
     pub(super) fn await_boot_up(&mut self, boot_time: Duration, now: Instant) {
         self.boot_deadline = deadline(boot_time, now);
         self.state = State::AwaitBootUp(AwaitBootUp {
-            until: self.boot_deadline.unwrap_or(now + ATTEMPT),
+            until: self.boot_end(now),
         });
     }
 
@@ -193,9 +196,8 @@ impl NodeBoot {
         self.await_boot_up(boot_time, now);
         if !self.is(Assignment::MAY_START) {
             self.guard(now);
-            let until = self.boot_deadline.unwrap_or(now + ATTEMPT);
             self.state = State::AwaitErrorControl(AwaitErrorControl {
-                deadline: until + self.patience(),
+                deadline: self.boot_end(now) + self.patience(),
             });
         } else if keep_alive {
             self.state = State::Identify(Identify { item: 0 });
@@ -223,13 +225,13 @@ impl NodeBoot {
     }
 
     /// When [`poll`](Self::poll) has to be called again at the latest.
-    pub(super) fn next_deadline(&self) -> Option<Instant> {
-        let guard = match self.state.is_guarded() {
-            true => self.guardian.next_deadline(),
-            false => None,
-        };
-        let next = earliest(self.state.deadline(), self.client.next_deadline());
-        earliest(next, guard)
+    pub(super) fn next_deadline(&self) -> Instant {
+        let client = Instant::of(self.client.next_deadline());
+        let next = self.state.deadline().min(client);
+        match self.state.is_guarded() {
+            true => next.min(Instant::of(self.guardian.next_deadline())),
+            false => next,
+        }
     }
 
     /// The time of a state is over.
@@ -264,7 +266,15 @@ impl NodeBoot {
     }
 
     fn boot_time_is_over(&self, now: Instant) -> bool {
-        self.boot_deadline.is_some_and(|deadline| now >= deadline)
+        now >= self.boot_deadline
+    }
+
+    /// How long it may take to boot.
+    fn boot_end(&self, now: Instant) -> Instant {
+        match self.boot_deadline {
+            Instant::NEVER => now + ATTEMPT,
+            deadline => deadline,
+        }
     }
 
     /// Sends an NMT command to this node alone.
@@ -280,7 +290,10 @@ impl NodeBoot {
         let result = BootResult::Failed(Failure { status, cause });
         let forever = status == Status::B && !self.is(Assignment::MANDATORY);
         self.state = State::GivenUp(GivenUp {
-            retry: forever.then_some(now + ATTEMPT),
+            retry: match forever {
+                true => now + ATTEMPT,
+                false => Instant::NEVER,
+            },
         });
         self.tries = 0;
         self.fresh = false;
@@ -308,6 +321,9 @@ impl NodeBoot {
 }
 
 /// The end of a boot time; zero lasts for ever.
-fn deadline(boot_time: Duration, now: Instant) -> Option<Instant> {
-    (boot_time != Duration::ZERO).then(|| now + boot_time)
+fn deadline(boot_time: Duration, now: Instant) -> Instant {
+    match boot_time {
+        Duration::ZERO => Instant::NEVER,
+        time => now + time,
+    }
 }

@@ -20,6 +20,16 @@ const LOAD: u32 = u32::from_le_bytes(*b"load");
 /// Where the node says when it was configured (CiA 301, 7.5.2.23).
 const SIGNATURE: [Address; 2] = [objects::CONFIGURATION_DATE, objects::CONFIGURATION_TIME];
 
+/// What is read before anything else, and what it is called when it is not what
+/// it must be.
+const IDENTITY: [(Address, Status); 5] = [
+    (objects::DEVICE_TYPE, Status::C),
+    (objects::VENDOR_ID, Status::D),
+    (objects::PRODUCT_CODE, Status::M),
+    (objects::REVISION_NUMBER, Status::N),
+    (objects::SERIAL_NUMBER, Status::O),
+];
+
 impl NodeBoot {
     /// A frame from the node's SDO server.
     pub(in super::super) fn on_sdo(&mut self, frame: &Frame, now: Instant) {
@@ -34,23 +44,19 @@ impl NodeBoot {
 
     /// Whether the state changed to one that may have something to send.
     fn advance_once(&mut self, now: Instant) -> bool {
-        if self
-            .state
-            .deadline()
-            .is_some_and(|deadline| now >= deadline)
-        {
+        if now >= self.state.deadline() {
             self.expire(now);
             return matches!(self.state, State::Identify(_));
         }
         match self.state {
-            State::Identify(Identify { item }) => match self.expectation(item) {
+            State::Identify(Identify { item }) => match IDENTITY.get(item) {
                 // 1000h is read even if it may be anything: it shows that the
                 // node answers.
-                Some((_, None, _)) if item != 0 => {
+                Some(_) if item != 0 && self.expected(item).is_none() => {
                     self.state = State::Identify(Identify { item: item + 1 });
                     return true;
                 }
-                Some((at, ..)) => self.read(at, now),
+                Some((at, _)) => self.read(*at, now),
                 None => {
                     self.report(Event::Identified(self.node.id));
                     if self.is(Assignment::KEEP_ALIVE) && !self.fresh {
@@ -168,24 +174,22 @@ impl NodeBoot {
         let found = <[u8; 4]>::try_from(data).map(u32::from_le_bytes);
         match self.state {
             State::Identify(Identify { item }) => {
-                let Some((at, expected, status)) = self.expectation(item) else {
+                let Some(&(at, status)) = IDENTITY.get(item) else {
                     return;
                 };
-                match found {
-                    Ok(found) => {
-                        let Some(expected) = expected.filter(|expected| *expected != found) else {
-                            self.state = State::Identify(Identify { item: item + 1 });
-                            return;
-                        };
-                        let cause = Cause::Mismatch {
-                            at,
-                            expected,
-                            found,
-                        };
-                        self.fail(status, cause, now);
+                let cause = match (found, self.expected(item)) {
+                    (Ok(found), Some(expected)) if found != expected => Cause::Mismatch {
+                        at,
+                        expected,
+                        found,
+                    },
+                    (Ok(_), _) => {
+                        self.state = State::Identify(Identify { item: item + 1 });
+                        return;
                     }
-                    Err(_) => self.fail(status, Cause::Garbled { at }, now),
-                }
+                    (Err(_), _) => Cause::Garbled { at },
+                };
+                self.fail(status, cause, now);
             }
             State::Verify(Verify { item }) => {
                 if found.ok().as_ref() == self.node.configured.get(item) {
@@ -225,7 +229,7 @@ impl NodeBoot {
         match self.state {
             State::Identify(Identify { item: 0 }) if !final_word => self.unreached(cause, now),
             State::Identify(Identify { item }) => {
-                let status = self.expectation(item).map_or(Status::B, |(_, _, s)| s);
+                let status = IDENTITY.get(item).map_or(Status::B, |(_, status)| *status);
                 self.fail(status, cause, now);
             }
             // It does not tell when it was configured: it is configured.
@@ -240,25 +244,22 @@ impl NodeBoot {
     fn unreached(&mut self, cause: Cause, now: Instant) {
         let mandatory = self.is(Assignment::MANDATORY);
         if mandatory && !self.has_given_up() && !self.boot_time_is_over(now) {
-            let at = now + ATTEMPT;
-            let at = self.boot_deadline.map_or(at, |deadline| deadline.min(at));
+            let at = self.boot_deadline.min(now + ATTEMPT);
             self.state = State::Retry(Retry { at });
         } else {
             self.fail(Status::B, cause, now);
         }
     }
 
-    /// What is read, what it must be, and what it is called when it is not.
-    fn expectation(&self, item: usize) -> Option<(Address, Option<u32>, Status)> {
+    /// What an entry of [`IDENTITY`] must be.
+    fn expected(&self, item: usize) -> Option<u32> {
         let identity = &self.node.identity;
-        [
-            (objects::DEVICE_TYPE, identity.device_type, Status::C),
-            (objects::VENDOR_ID, identity.vendor, Status::D),
-            (objects::PRODUCT_CODE, identity.product, Status::M),
-            (objects::REVISION_NUMBER, identity.revision, Status::N),
-            (objects::SERIAL_NUMBER, identity.serial, Status::O),
-        ]
-        .get(item)
-        .copied()
+        match item {
+            0 => identity.device_type,
+            1 => identity.vendor,
+            2 => identity.product,
+            3 => identity.revision,
+            _ => identity.serial,
+        }
     }
 }

@@ -103,7 +103,8 @@ pub(super) struct Lost {
 /// (CiA 302-2, "Boot slave", step 2).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct GivenUp {
-    pub(super) retry: Option<Instant>,
+    /// [`Instant::NEVER`]: it is not tried again.
+    pub(super) retry: Instant,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -128,16 +129,17 @@ pub(super) enum State {
 
 impl State {
     /// When time alone leads out.
-    pub(super) const fn deadline(&self) -> Option<Instant> {
+    #[inline(never)]
+    pub(super) const fn deadline(&self) -> Instant {
         match *self {
-            State::AwaitBootUp(AwaitBootUp { until }) => Some(until),
-            State::Retry(Retry { at }) => Some(at),
+            State::AwaitBootUp(AwaitBootUp { until }) => until,
+            State::Retry(Retry { at }) => at,
             State::AwaitState(AwaitState { deadline })
             | State::AwaitReset(AwaitReset { deadline, .. })
             | State::AwaitErrorControl(AwaitErrorControl { deadline })
-            | State::Starting(Starting { deadline }) => Some(deadline),
+            | State::Starting(Starting { deadline }) => deadline,
             State::GivenUp(GivenUp { retry }) => retry,
-            _ => None,
+            _ => Instant::NEVER,
         }
     }
 
