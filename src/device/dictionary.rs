@@ -135,18 +135,15 @@ impl<const N: usize> Dictionary<N> {
         let Some(status) = NodeStatus::after(event) else {
             return;
         };
-        match event.node() {
-            Some(node) => {
-                if let Some(record) = self.record(node) {
-                    record.step(status);
-                }
-            }
-            None => {
-                let known = usize::from(nodes::<N>(self.network));
-                for record in self.nodes.iter_mut().take(known) {
-                    record.step(status);
-                }
-            }
+        let (first, count) = match event.node() {
+            Some(node) => match self.network.find(node) {
+                Some((place, _)) => (place, 1),
+                None => return,
+            },
+            None => (0, usize::from(nodes::<N>(self.network))),
+        };
+        for record in self.nodes.iter_mut().skip(first).take(count) {
+            record.step(status);
         }
     }
 }

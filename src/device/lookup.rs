@@ -17,18 +17,12 @@ pub(super) struct Found {
     pub(super) sub: u8,
     /// Of the object in its row of the table.
     pub(super) place: u16,
+    /// The node that the entry is about, if sub-index or index tell one.
+    pub(super) node: Option<NodeId>,
     pub(super) at: u16,
 }
 
 impl Found {
-    /// The node that it is about, if it is about one.
-    pub(super) fn node(&self) -> Option<NodeId> {
-        NodeId::new(match self.item {
-            Item::EmcyCount | Item::EmcyHistory | Item::Process => self.place as u8,
-            _ => self.sub,
-        })
-    }
-
     /// Where in a record without gaps it is, counted from 0.
     pub(super) fn n(&self) -> usize {
         usize::from(self.sub).wrapping_sub(1)
@@ -41,7 +35,12 @@ impl<const N: usize> Dictionary<N> {
         let mut highest = None;
         for row in &TABLE {
             let Some(place) = row.place(at) else { continue };
-            let found = Found {
+            let node = NodeId::new(match row.item {
+                Item::EmcyCount | Item::EmcyHistory | Item::Process => place as u8,
+                _ => sub,
+            });
+            let mut found = Found {
+                node,
                 item: row.item,
                 data_type: row.data_type,
                 access: row.access,
@@ -53,7 +52,8 @@ impl<const N: usize> Dictionary<N> {
                 continue;
             };
             if (row.sub..=last).contains(&sub) {
-                return Ok(self.refine(found));
+                self.refine(&mut found);
+                return Ok(found);
             }
             highest = Some(last);
         }
@@ -65,6 +65,7 @@ impl<const N: usize> Dictionary<N> {
                 access: Access::Constant,
                 sub: last,
                 place: 0,
+                node: None,
                 at,
             }),
             Some(_) => Err(AbortCode::NO_SUCH_SUB_INDEX),
@@ -84,59 +85,56 @@ impl<const N: usize> Dictionary<N> {
         match found.item {
             Item::Setting(Setting::ConsumerHeartbeat(_)) => Some(nodes::<N>(network)),
             Item::SdoClient | Item::SdoClientNode => {
-                let client = network.nodes.get(usize::from(found.place));
-                client.map(|_| last)
+                network.nodes.get(usize::from(found.place))?;
+                Some(last)
             }
-            Item::PdoCobId | Item::PdoTransmission => {
-                Mirrored::find(network, found.at).map(|_| last)
+            Item::PdoCobId | Item::PdoTransmission | Item::PdoMapping => {
+                let pdo = Mirrored::find(network, found.at)?.pdo;
+                Some(match found.item {
+                    Item::PdoMapping => pdo.mapping.len() as u8,
+                    _ => last,
+                })
             }
-            Item::PdoMapping => {
-                let mirrored = Mirrored::find(network, found.at);
-                mirrored.map(|mirrored| mirrored.pdo.mapping.len() as u8)
+            Item::EmcyCount | Item::EmcyHistory | Item::Process => {
+                let (node, _) = self.node(found.node?)?;
+                Some(match found.item {
+                    Item::Process => Process::count(node),
+                    _ => last,
+                })
             }
-            Item::EmcyCount | Item::EmcyHistory => self.node(found.node()?).map(|_| last),
-            Item::Process => self
-                .node(found.node()?)
-                .map(|(node, _)| Process::count(node)),
             _ => Some(last),
         }
     }
 
     /// What the table cannot say of an entry that exists.
-    fn refine(&self, found: Found) -> Found {
-        let place = || Some(self.network.find(found.node()?)?.0);
-        let (item, access) = match found.item {
-            Item::Setting(Setting::ConsumerHeartbeat(_)) => (
-                Item::Setting(Setting::ConsumerHeartbeat(found.n() as u8)),
-                found.access,
-            ),
+    fn refine(&self, found: &mut Found) {
+        match found.item {
+            Item::Setting(Setting::ConsumerHeartbeat(_)) => {
+                found.item = Item::Setting(Setting::ConsumerHeartbeat(found.n() as u8));
+            }
             Item::Setting(Setting::Assignment(_)) => {
-                match place().filter(|place| *place < usize::from(nodes::<N>(self.network))) {
-                    Some(place) => (
-                        Item::Setting(Setting::Assignment(place as u8)),
-                        found.access,
-                    ),
-                    None => (Item::Zero, Access::Constant),
+                let place = found.node.and_then(|node| self.network.find(node));
+                match place {
+                    Some((place, _)) if place < usize::from(nodes::<N>(self.network)) => {
+                        found.item = Item::Setting(Setting::Assignment(place as u8));
+                    }
+                    _ => {
+                        found.item = Item::Zero;
+                        found.access = Access::Constant;
+                    }
                 }
             }
-            item => (item, found.access),
-        };
-        let data_type = match item {
-            Item::Process => self
-                .process(&found)
-                .map_or(found.data_type, |process| process.data_type()),
-            _ => found.data_type,
-        };
-        Found {
-            item,
-            access,
-            data_type,
-            ..found
+            Item::Process => {
+                if let Some(process) = self.process(found) {
+                    found.data_type = process.data_type();
+                }
+            }
+            _ => {}
         }
     }
 
     pub(super) fn process(&self, found: &Found) -> Option<Process> {
-        let (node, _) = self.node(found.node()?)?;
+        let (node, _) = self.node(found.node?)?;
         Process::find(node, found.sub)
     }
 }

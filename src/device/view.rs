@@ -39,9 +39,8 @@ impl<B: Board, const N: usize> View<'_, B, N> {
     fn value(&mut self, found: &Found) -> Result<u64, AbortCode> {
         let dictionary = &*self.dictionary;
         let network = dictionary.network;
-        let known = found.node().and_then(|id| dictionary.node(id));
+        let known = found.node.and_then(|id| dictionary.node(id));
         let record = known.map(|(_, record)| record);
-        let pdo = || Mirrored::find(network, found.at).ok_or(AbortCode::NO_SUCH_OBJECT);
         let number: u32 = match found.item {
             Item::Highest => found.sub.into(),
             Item::Setting(setting) => dictionary.settings.get(setting),
@@ -75,14 +74,20 @@ impl<B: Board, const N: usize> View<'_, B, N> {
                     _ => node.get().into(),
                 }
             }
-            Item::PdoCobId => pdo()?.cob_id(),
-            Item::PdoTransmission => pdo()?.pdo.transmission.code().into(),
-            Item::PdoMapping => {
-                let entry = pdo()?.mapped(found.sub);
-                entry.ok_or(AbortCode::NO_SUCH_SUB_INDEX)?.0
+            Item::PdoCobId | Item::PdoTransmission | Item::PdoMapping => {
+                let mirrored = Mirrored::find(network, found.at);
+                let mirrored = mirrored.ok_or(AbortCode::NO_SUCH_OBJECT)?;
+                match found.item {
+                    Item::PdoCobId => mirrored.cob_id(),
+                    Item::PdoTransmission => mirrored.pdo.transmission.code().into(),
+                    _ => {
+                        let entry = mirrored.mapped(found.sub);
+                        entry.ok_or(AbortCode::NO_SUCH_SUB_INDEX)?.0
+                    }
+                }
             }
             Item::Zero => 0,
-            Item::NmtRequest if found.node() == Some(network.master.node) => {
+            Item::NmtRequest if found.node == Some(network.master.node) => {
                 dictionary.state.code().into()
             }
             Item::NmtRequest => record.map_or(0, |record| record.presence.code()).into(),
@@ -167,7 +172,7 @@ impl<B: Board, const N: usize> ObjectDictionary for View<'_, B, N> {
         let number = value.as_u32();
         let found = dictionary.find(at)?;
         // 80h, all nodes, is not a node-ID.
-        let node = found.node();
+        let node = found.node;
         let target = node.map_or(Target::All, Target::Node);
         match found.item {
             Item::Setting(setting) => return dictionary.change(setting, number),
@@ -205,7 +210,7 @@ impl<B: Board, const N: usize> ObjectDictionary for View<'_, B, N> {
     fn read(&mut self, at: Address, offset: u32, buf: &mut [u8]) -> Result<Chunk, AbortCode> {
         let dictionary = &*self.dictionary;
         let found = dictionary.find(at)?;
-        let known = found.node().and_then(|id| dictionary.node(id));
+        let known = found.node.and_then(|id| dictionary.node(id));
         let description = &dictionary.description;
         let text = match found.item {
             Item::DeviceName => description.name,
