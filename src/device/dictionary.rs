@@ -122,10 +122,10 @@ impl<const N: usize> Dictionary<N> {
             self.settings.encode(self.network, &mut buf)?
         };
         let saved = board.save(buf.get(..len).unwrap_or(&[]));
-        if saved.is_err() {
-            self.errors.raise(super::MasterError::Storage.emcy());
-        } else {
-            self.errors.clear(super::MasterError::Storage.emcy());
+        let error = super::MasterError::Storage.emcy();
+        match saved {
+            Ok(()) => self.errors.clear(error),
+            Err(_) => self.errors.raise(error),
         }
         saved
     }
