@@ -71,25 +71,27 @@ impl<const N: usize> NetworkBoot<N> {
         boot
     }
 
-    /// As [`NetworkBoot::new`], made where it is to stay, without a copy on the
-    /// stack.
+    /// As [`NetworkBoot::with_settings`], made where it is to stay, without a copy
+    /// on the stack.
     pub fn new_in<'a>(
         place: &'a mut MaybeUninit<NetworkBoot<N>>,
         network: &'static Network,
+        settings: &Settings<N>,
         now: Instant,
     ) -> &'a mut NetworkBoot<N> {
-        let settings = Settings::of(network);
-        let boot = place.write(NetworkBoot::without_nodes(network, &settings, now));
-        boot.add_nodes(&settings);
+        let boot = place.write(NetworkBoot::without_nodes(network, settings, now));
+        boot.add_nodes(settings);
         boot
     }
 
     fn add_nodes(&mut self, settings: &Settings<N>) {
-        for (node, settings) in self.network.nodes.iter().zip(&settings.nodes) {
-            // There is room: there are `N` settings.
-            let _ = self
-                .nodes
-                .push(NodeBoot::new(self.network, node, *settings));
+        for (place, settings) in settings.nodes.iter().enumerate() {
+            if let Some(node) = self.network.nodes.get(place) {
+                // There is room: there are `N` settings.
+                let _ = self
+                    .nodes
+                    .push(NodeBoot::new(self.network, node, *settings));
+            }
         }
     }
 
@@ -130,8 +132,10 @@ impl<const N: usize> NetworkBoot<N> {
             self.phase = Phase::NotMaster;
         }
         self.boot_time = settings.boot_time;
-        for (node, settings) in self.nodes.iter_mut().zip(&settings.nodes) {
-            node.set_settings(*settings);
+        for (place, settings) in settings.nodes.iter().enumerate() {
+            if let Some(node) = self.nodes.get_mut(place) {
+                node.set_settings(*settings);
+            }
         }
     }
 

@@ -161,9 +161,8 @@ mod app {
         let sync = defmt::unwrap!(can::Element::new(&Frame::empty(CobId::SYNC)));
         defmt::unwrap!(sdo_configurator::spawn().ok());
         let own = new_own_node(cx.local.own_place);
-        let boot = new_boot(cx.local.boot_place);
         let store = own.load(board.storage);
-        boot.set_settings(&own.device.settings().boot());
+        let boot = new_boot(cx.local.boot_place, own);
         (
             Shared {
                 od: MasterOd::new(cx.local.lengths),
@@ -233,8 +232,10 @@ mod app {
     #[inline(never)]
     fn new_boot(
         place: &'static mut MaybeUninit<NetworkBoot<AXES>>,
+        own: &OwnNode,
     ) -> &'static mut NetworkBoot<AXES> {
-        NetworkBoot::new_in(place, NETWORK, Instant::ZERO)
+        let settings = own.device.settings().boot();
+        NetworkBoot::new_in(place, NETWORK, &settings, Instant::ZERO)
     }
 
     #[inline(never)]

@@ -3,21 +3,26 @@
 
 use crate::{
     app::app::{CLOCK, NETWORK, sdo_configurator as task},
-    duties::{Silent, act, begin, follow, obey, order_boot, serve},
+    duties::Silent,
     log::{self, Log},
     roll::{self, Task},
     transfer::{self, Transfer},
     wake,
 };
-use canmaster::{design, device::MasterError, nmt::State, time::Instant};
-use nucleo_g474re::{reset_cause::ResetCause, timers};
+use canmaster::{
+    design,
+    device::{Event, MasterError, Setting},
+    nmt::State,
+    time::Instant,
+};
+use nucleo_g474re::reset_cause::ResetCause;
 use rtic::Mutex;
 
 /// The task with what it has.
 pub(crate) struct Configurator<'a> {
-    local: task::LocalResources<'a>,
-    shared: task::SharedResources<'a>,
-    log: Log,
+    pub(crate) local: task::LocalResources<'a>,
+    pub(crate) shared: task::SharedResources<'a>,
+    pub(crate) log: Log,
     silent: Silent,
     transfer: Option<Transfer>,
 }
@@ -26,7 +31,7 @@ impl<'a> Configurator<'a> {
     /// Tells how the board was started, and takes over its settings.
     pub(crate) fn new(
         local: task::LocalResources<'a>,
-        mut shared: task::SharedResources<'a>,
+        shared: task::SharedResources<'a>,
     ) -> Configurator<'a> {
         log::started(*local.reset_cause);
         defmt::info!(
@@ -39,14 +44,21 @@ impl<'a> Configurator<'a> {
         if local.store.is_none() {
             defmt::warn!("settings are not stored (1010h): set option bit DBANK, then flash again");
         }
-        begin(local.own, local.sync_period, local.orders_to, &mut shared);
-        Configurator {
+        let mut configurator = Configurator {
             local,
             shared,
             log: Log::new(NETWORK),
             silent: Silent::default(),
             transfer: None,
+        };
+        for setting in [
+            Setting::SyncOverflow,
+            Setting::ProducerHeartbeat,
+            Setting::ConsumerHeartbeat(0),
+        ] {
+            configurator.obey(&Event::Changed(setting));
         }
+        configurator
     }
 
     /// Does what there is to do, and asks to be woken for what comes next. The test
@@ -54,51 +66,30 @@ impl<'a> Configurator<'a> {
     /// requests of clients first, since they may have something to say to the
     /// boot-up; the frames that it sends are on their way at the end.
     pub(crate) fn round(&mut self) {
+        let now = self.now();
         let tested = transfer::go_on(
             &mut self.transfer,
             self.local.own.device.transfer(),
             self.local.transfer_answers,
             &mut self.shared.tx_queue,
-            now(*self.local.clock),
+            now,
         );
-        self.serve();
+        while self.serve() {
+            while let Some(event) = self.local.own.device.take_event() {
+                self.obey(&event);
+            }
+        }
         let bus_off = self.listen();
         // A board that is stopped has neither SDO nor SYNC: the boot-up waits.
         let held = self.local.own.device.state() == State::Stopped && !bus_off;
         self.boot(held);
         roll::check_in(Task::SdoConfigurator);
         let boots = self.local.boot.next_deadline().filter(|_| !held);
-        let mut next = now(*self.local.clock) + design::CONFIGURATOR_PERIOD;
+        let mut next = self.now() + design::CONFIGURATOR_PERIOD;
         for deadline in [boots, self.local.own.device.next_deadline(), tested] {
             next = deadline.map_or(next, |deadline| deadline.min(next));
         }
         wake::at(next.as_micros() as u32);
-    }
-
-    /// The board's own services.
-    fn serve(&mut self) {
-        let local = &mut self.local;
-        let shared = &mut self.shared;
-        while serve(
-            local.own,
-            local.boot,
-            local.store,
-            local.sync_period,
-            local.requests,
-            now(*local.clock),
-            shared,
-        ) {
-            while let Some(event) = local.own.device.take_event() {
-                obey(
-                    &event,
-                    local.own,
-                    local.sync_period,
-                    local.orders_to,
-                    shared,
-                );
-                order_boot(&event, local.boot, local.own, now(*local.clock));
-            }
-        }
     }
 
     /// What the other tasks have to say. `true`: the controller is bus-off.
@@ -120,7 +111,8 @@ impl<'a> Configurator<'a> {
         let bus_off = self.shared.control.lock(|control| control.bus_off);
         // The controller had the silent phase to come back in.
         if bus_off && !local.boot.is_silent() {
-            local.boot.bus_off(now(*local.clock));
+            let now = self.now();
+            self.local.boot.bus_off(now);
         }
         bus_off
     }
@@ -128,31 +120,26 @@ impl<'a> Configurator<'a> {
     /// The boot-up: the time first, then one frame at a time, since each may
     /// cause several actions, which are carried out before the next.
     fn boot(&mut self, held: bool) {
-        let local = &mut self.local;
         loop {
-            while !held && let Some(action) = local.boot.poll(now(*local.clock)) {
-                act(
-                    &action,
-                    local.own,
-                    local.sync_period,
-                    &mut self.log,
-                    &mut self.shared,
-                );
+            while !held && let Some(action) = self.local.boot.poll(self.now()) {
+                self.act(&action);
             }
-            follow(local.boot, local.own, &mut self.shared);
-            let state = || {
-                let frame = local.states.dequeue();
-                frame.inspect(|frame| local.own.error_control(frame))
+            self.follow();
+            let frame = match self.local.answers.dequeue() {
+                None => self.local.states.dequeue(),
+                answer => answer,
             };
-            let Some(frame) = local.answers.dequeue().or_else(state) else {
+            let Some(frame) = frame else {
                 break;
             };
-            local.boot.on_frame(&frame, now(*local.clock));
+            // It leaves the answers of SDO servers alone.
+            self.local.own.error_control(&frame);
+            self.local.boot.on_frame(&frame, self.now());
         }
     }
-}
 
-#[inline(never)]
-fn now(clock: timers::Microseconds) -> Instant {
-    CLOCK.now(|| clock.now())
+    #[inline(never)]
+    pub(crate) fn now(&self) -> Instant {
+        CLOCK.now(|| self.local.clock.now())
+    }
 }

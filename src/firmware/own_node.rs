@@ -148,11 +148,6 @@ impl OwnNode {
         }
     }
 
-    /// The network that the board is the master of.
-    pub(crate) const fn network(&self) -> &'static Network {
-        self.network
-    }
-
     /// Takes over the settings that were saved. Not inlined: the bytes are to
     /// leave the stack.
     #[inline(never)]

@@ -195,8 +195,7 @@ impl<const N: usize> Supervisor<N> {
     /// Takes in a frame of error control or an emergency.
     pub fn on_frame(&mut self, frame: &Frame, now: Instant) -> Option<Report> {
         if let Some((node, emcy)) = Emcy::decode(frame) {
-            let axis = self.nodes.iter().position(|w| w.consumer.node() == node);
-            return Some(self.report(axis, Notice::Emcy { node, emcy }));
+            return Some(self.report(self.axis(node), Notice::Emcy { node, emcy }));
         }
         let ErrorControl { node, state, .. } = ErrorControl::decode(frame)?;
         if let Some(other) = self.other.as_mut().filter(|other| other.node() == node) {
@@ -204,11 +203,8 @@ impl<const N: usize> Supervisor<N> {
             other.heard(state, now);
             return was_lost.then(|| self.report(None, Notice::HeartbeatBack(node)));
         }
-        let (axis, watched) = self
-            .nodes
-            .iter_mut()
-            .enumerate()
-            .find(|(_, watched)| watched.consumer.node() == node)?;
+        let axis = self.axis(node)?;
+        let watched = self.nodes.get_mut(axis)?;
         let heard = watched.consumer.heard(state, now);
         if watched.reported || !watched.armed {
             return None;
@@ -241,15 +237,21 @@ impl<const N: usize> Supervisor<N> {
     /// The heartbeat of `node` may stay away for `time` from now on; zero: for
     /// ever.
     pub fn set_consumer_time(&mut self, node: NodeId, time: Duration) {
-        let watched = self.nodes.iter_mut().map(|watched| &mut watched.consumer);
-        for consumer in watched.filter(|consumer| consumer.node() == node) {
-            consumer.set_time(time);
+        let axis = self.axis(node);
+        if let Some(watched) = axis.and_then(|axis| self.nodes.get_mut(axis)) {
+            watched.consumer.set_time(time);
         }
     }
 
     /// Watches a node that the network does not name, another NMT master for one.
     pub fn watch(&mut self, other: Option<(NodeId, Duration)>) {
         self.other = other.map(|(node, time)| Consumer::new(node, time));
+    }
+
+    #[inline(never)]
+    fn axis(&self, node: NodeId) -> Option<usize> {
+        let mut nodes = self.nodes.iter();
+        nodes.position(|watched| watched.consumer.node() == node)
     }
 
     fn report(&self, axis: Option<usize>, notice: Notice) -> Report {

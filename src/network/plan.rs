@@ -71,22 +71,22 @@ pub fn plan(network: &'static Network, node: &'static Node) -> impl Iterator<Ite
 /// before it. `None` past the last.
 pub fn planned(network: &Network, node: &Node, n: usize) -> Option<ConfigWrite> {
     let mut n = n;
-    for (direction, used) in [
-        (Direction::Receive, node.rpdos),
-        (Direction::Transmit, node.tpdos),
-    ] {
-        for number in 1..=PDOS_PER_NODE {
-            let steps = PdoSteps {
-                node: node.id,
-                direction,
-                number,
-                used: used.iter().find(|pdo| pdo.number == number),
-            };
-            if n < steps.len() {
-                return steps.get(n);
-            }
-            n -= steps.len();
-        }
+    for place in 0..2 * PDOS_PER_NODE {
+        let (direction, pdos) = match place / PDOS_PER_NODE {
+            0 => (Direction::Receive, node.rpdos),
+            _ => (Direction::Transmit, node.tpdos),
+        };
+        let number = place % PDOS_PER_NODE + 1;
+        let steps = PdoSteps {
+            node: node.id,
+            direction,
+            number,
+            used: pdos.iter().find(|pdo| pdo.number == number),
+        };
+        let Some(after) = n.checked_sub(steps.len()) else {
+            return steps.get(n);
+        };
+        n = after;
     }
     if let Some(write) = node.start_values.get(n) {
         return Some(*write);
