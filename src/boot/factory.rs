@@ -38,8 +38,8 @@ enum Step {
 #[derive(Debug)]
 pub(super) struct Factory {
     step: Step,
-    /// A request of the step is out, until then.
-    asked: Option<Instant>,
+    /// A request of the step is out, until then; [`Instant::NEVER`]: none is.
+    asked: Instant,
     scan: Fastscan,
     /// Somebody answered to the question that is out.
     yes: bool,
@@ -53,7 +53,7 @@ impl Factory {
     pub(super) const fn new() -> Factory {
         Factory {
             step: Step::Leave,
-            asked: None,
+            asked: Instant::NEVER,
             scan: Fastscan::new([None; 4]),
             yes: false,
             place: 0,
@@ -66,7 +66,7 @@ impl Factory {
         matches!(self.step, Step::Over)
     }
 
-    pub(super) const fn next_deadline(&self) -> Option<Instant> {
+    pub(super) const fn next_deadline(&self) -> Instant {
         self.asked
     }
 
@@ -98,13 +98,13 @@ impl Factory {
         nodes: &'static [Node],
         wanted: impl Fn(usize) -> bool,
     ) -> Option<Action> {
-        if self.asked.is_some_and(|until| now < until) {
-            return None;
-        }
-        if self.asked.is_some()
-            && let Some(event) = self.settle(None, nodes)
-        {
-            return Some(Action::Report(event));
+        if self.asked != Instant::NEVER {
+            if now < self.asked {
+                return None;
+            }
+            if let Some(event) = self.settle(None, nodes) {
+                return Some(Action::Report(event));
+            }
         }
         if matches!(self.step, Step::Next) {
             while self.place < nodes.len() && !wanted(self.place) {
@@ -136,7 +136,7 @@ impl Factory {
             Step::Store => (Request::Store.bytes(), ANSWER_TIMEOUT),
             Step::Next | Step::Over => return None,
         };
-        self.asked = Some(now + time);
+        self.asked = now + time;
         self.yes = false;
         Some(Action::Send(Frame::full(CobId::LSS_MASTER, bytes)))
     }
@@ -148,7 +148,7 @@ impl Factory {
         result: Option<ConfigurationResult>,
         nodes: &'static [Node],
     ) -> Option<Event> {
-        self.asked = None;
+        self.asked = Instant::NEVER;
         let node = nodes.get(self.place).map(|node| node.id);
         let ok = result.is_some_and(ConfigurationResult::is_ok);
         let event = match (self.step, node) {

@@ -270,7 +270,7 @@ impl<const N: usize> NetworkBoot<N> {
             next = self.until;
         }
         if self.phase.listens() {
-            next = next.min(Instant::of(self.factory.next_deadline()));
+            next = next.min(self.factory.next_deadline());
         }
         for node in &self.nodes {
             next = next.min(node.next_deadline());

@@ -136,6 +136,7 @@ impl Consumer {
 
     /// Notices, once, that the heartbeat has been missing for the consumer
     /// heartbeat time.
+    #[inline(never)]
     pub fn poll(&mut self, now: Instant) -> Option<Lost> {
         let deadline = self.next_deadline()?;
         let last = self.state?;
