@@ -11,7 +11,7 @@ use crate::cargo;
 
 const TABLE: &str = "docs/conformance.md";
 /// Where modules and tests are.
-const SOURCES: [&str; 8] = [
+const SOURCES: [&str; 9] = [
     "src",
     "tests",
     "sim/src",
@@ -19,6 +19,7 @@ const SOURCES: [&str; 8] = [
     "network/src",
     "network/tests",
     "xtask/src",
+    "xtask/tests",
     "boards",
 ];
 /// What the paths in the table are relative to.
