@@ -44,11 +44,15 @@ pub struct Outcome {
     pub files: Vec<String>,
 }
 
-/// Reads and checks the description at `path`.
+/// Reads and checks the description at `path`, also against what the firmware of
+/// this project can do.
 pub fn load(path: &Path) -> Outcome {
     let name = path.display().to_string();
     match std::fs::read(path) {
-        Ok(bytes) => read(&Source::new(name, &bytes), &mut |file| std::fs::read(file)),
+        Ok(bytes) => {
+            let source = Source::new(name, &bytes);
+            read_for_firmware(&source, &mut |file| std::fs::read(file))
+        }
         Err(error) => {
             let source = Source::new(&name, b"");
             let mut problems = Problems::default();
@@ -69,7 +73,20 @@ pub fn load(path: &Path) -> Outcome {
 
 /// The same from memory: `open` gives the bytes of the files that the description
 /// names, relative to its own folder.
-pub fn read(source: &Source, open: &mut dyn FnMut(&Path) -> io::Result<Vec<u8>>) -> Outcome {
+pub fn read_for_firmware(source: &Source, open: &mut Open<'_>) -> Outcome {
+    outcome(source, open, true)
+}
+
+/// What any CANopen master may do, from memory: the rules of the standard, the
+/// devices and the bus.
+pub fn read(source: &Source, open: &mut Open<'_>) -> Outcome {
+    outcome(source, open, false)
+}
+
+/// Gives the bytes of a file.
+pub type Open<'a> = dyn FnMut(&Path) -> io::Result<Vec<u8>> + 'a;
+
+fn outcome(source: &Source, open: &mut Open<'_>, for_firmware: bool) -> Outcome {
     let mut problems = Problems::default();
     let mut files = vec![source.name().to_string()];
     let folder = Path::new(source.name())
@@ -83,7 +100,8 @@ pub fn read(source: &Source, open: &mut dyn FnMut(&Path) -> io::Result<Vec<u8>>)
         open(&path).map(|bytes| Source::new(shown, &bytes))
     };
     let machine = Description::read(source, &mut problems).and_then(|description| {
-        let machine = resolve::machine(&description, source, &mut open, &mut problems);
+        let machine =
+            resolve::machine(&description, source, &mut open, for_firmware, &mut problems);
         machine.filter(|_| !problems.has_errors())
     });
     Outcome {

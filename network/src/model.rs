@@ -93,6 +93,55 @@ pub struct Node {
     pub start_values: Vec<Write>,
 }
 
+/// A motor with its encoder, gear and limits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Motor {
+    /// Increments of the encoder for a turn of the motor.
+    pub increments_per_turn: u32,
+    /// Turns of the motor for turns of the load.
+    pub gear: (u32, u32),
+    /// rpm
+    pub max_speed: u32,
+    /// rpm/s
+    pub max_acceleration: u32,
+    /// From home, in increments.
+    pub max_travel: u32,
+}
+
+/// Objects of CiA 402 that limit an axis.
+const MAX_PROFILE_VELOCITY: Address = Address::new(0x607F, 0);
+const MAX_MOTOR_SPEED: Address = Address::new(0x6080, 0);
+const MAX_ACCELERATION: Address = Address::new(0x60C5, 0);
+const MIN_POSITION: Address = Address::new(0x607D, 1);
+const MAX_POSITION: Address = Address::new(0x607D, 2);
+/// What is not limited is a number that the firmware can still count with.
+const UNLIMITED: u32 = i32::MAX as u32;
+
+impl Node {
+    /// Its motor, within the limits that are written to the drive. `None`
+    /// without [`increments_per_turn`](Self::increments_per_turn).
+    pub fn motor(&self) -> Option<Motor> {
+        let written = |at: Address| {
+            let write = self.start_values.iter().rfind(|write| write.at == at);
+            write.map(|write| write.value)
+        };
+        let least = |all: &[Address], magnitude: fn(u32) -> u32| {
+            let values = all.iter().filter_map(|at| written(*at)).map(magnitude);
+            values.min().unwrap_or(UNLIMITED).min(UNLIMITED)
+        };
+        Some(Motor {
+            increments_per_turn: self.increments_per_turn?,
+            gear: self.gear,
+            max_speed: least(&[MAX_PROFILE_VELOCITY, MAX_MOTOR_SPEED], |rpm| rpm),
+            max_acceleration: least(&[MAX_ACCELERATION], |rpm_s| rpm_s),
+            max_travel: least(&[MIN_POSITION, MAX_POSITION], |position| {
+                (position as i32).unsigned_abs()
+            }),
+        })
+    }
+}
+
 /// Expected identity; `None` is not checked.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Identity {

@@ -3,6 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
+use canmaster::motion::experiment::{GROUP, Motor};
 use canmaster::network::sample::SIX_EPOS4;
 use canmaster::network::{self, Network};
 use canmaster_network::derive::{concise_dcf, dbc, picture, rust};
@@ -54,17 +55,13 @@ fn shown(network: &Network) -> String {
 #[test]
 fn the_generated_network_is_the_one_of_the_library() {
     assert_eq!(shown(&generated::NETWORK), shown(&SIX_EPOS4));
-    assert_eq!(generated::AXES, canmaster::design::AXES);
-    assert_eq!(
-        generated::TPDO_DEADLINE_US,
-        u32::from(canmaster::design::TPDO_DEADLINE_US)
-    );
-    assert_eq!(
-        generated::TPDO_MISSING_LIMIT,
-        canmaster::design::TPDO_MISSING_LIMIT
-    );
-    // The firmware's own limit is at least as careful.
-    const { assert!(generated::SHORTEST_CYCLE_US <= canmaster::design::SYNC_LIMITS.shortest_period) };
+    assert_eq!(generated::AXES, SIX_EPOS4.nodes.len());
+    assert_eq!(generated::MOTORS, [Motor::SAMPLE; generated::AXES]);
+    assert_eq!(generated::TPDO_DEADLINE_US, 5_000);
+    assert_eq!(generated::TPDO_MISSING_LIMIT, GROUP.missing_tpdo_max);
+    // What comes after the deadline at worst still fits.
+    const { assert!(generated::SHORTEST_CYCLE_US > generated::TPDO_DEADLINE_US as u32) };
+    assert_eq!(generated::RPDOS_US, 2_000);
     assert_eq!(generated::BIT_TIMING, (1, 20, 3));
 }
 

@@ -13,7 +13,7 @@ use canmaster_sim::drive::{DriveFault, cia402};
 use canmaster_sim::judge::{Outcome, STANDSTILL_RPM};
 use canmaster_sim::time::Time;
 use canmaster_sim::world::trials::{moving, spin_in_motion};
-use canmaster_sim::world::{Record, Stimulus, World, round_trip};
+use canmaster_sim::world::{Record, Stimulus, World, sample};
 
 use common::image;
 
@@ -108,7 +108,7 @@ fn a_warning_and_its_end_stop_nobody() {
     let code = EmcyCode::EPOS4_OVERLOAD.0;
     let fault = DriveFault::Error { at, code, until };
     world.apply(Stimulus::Drive { node: NODE, fault });
-    let limit = at + round_trip().unwrap() + Time::from_ms(1000);
+    let limit = at + sample().round_trip().unwrap() + Time::from_ms(1000);
     let done = world.run_to(limit, |world| world.round_trips() == (1, false));
     assert!(done, "the round trip does not end");
     let record = world.finish();

@@ -309,7 +309,7 @@ fn pdos_of_wrong_length_are_told() {
 fn the_sync_follows_1005h_1006h_and_1019h_in_pre_operational() {
     let mut client = alone(41);
     refused(client.put(0x1006, 0, 65_536, 4), AbortCode::VALUE_TOO_HIGH);
-    refused(client.put(0x1006, 0, 9_999, 4), AbortCode::VALUE_TOO_LOW);
+    refused(client.put(0x1006, 0, 7_499, 4), AbortCode::VALUE_TOO_LOW);
     refused(client.put(0x1007, 0, 7_499, 4), AbortCode::VALUE_TOO_LOW);
     refused(client.put(0x1007, 0, 10_001, 4), AbortCode::VALUE_TOO_HIGH);
     refused(client.put(0x1019, 0, 3, 1), AbortCode::DEVICE_STATE);

@@ -5,13 +5,13 @@ mod common;
 use canmaster_sim::bus::log::write_candump;
 use canmaster_sim::judge::{ARRIVAL_TOLERANCE, Outcome, worst_pair};
 use canmaster_sim::time::Time;
-use canmaster_sim::world::{Record, Scenario, World, assignment, network, round_trip};
+use canmaster_sim::world::{Record, Scenario, World, sample};
 
 use common::image;
 
 /// Start, one round trip and a little more.
 fn one_trip() -> Time {
-    Time::from_ms(3500) + round_trip().unwrap() + Time::from_ms(500)
+    Time::from_ms(3500) + sample().round_trip().unwrap() + Time::from_ms(500)
 }
 
 fn run(scenario: Scenario) -> Record {
@@ -32,8 +32,8 @@ fn assert_good(record: &Record) {
         "{}",
         record.verdict.reason
     );
-    let axes = network().nodes.len();
-    let moves = assignment().moves.len();
+    let axes = sample().network().nodes.len();
+    let moves = sample().assignment().moves.len();
     let trips = record.releases.len();
     assert_eq!(record.arrivals.len(), axes * moves * trips);
     assert!(
@@ -44,7 +44,7 @@ fn assert_good(record: &Record) {
     );
     let (apart, ..) = worst_pair(&record.arrivals).unwrap();
     assert!(
-        apart <= Time::from(network().cycle),
+        apart <= Time::from(sample().network().cycle),
         "a pair stopped {apart} s apart"
     );
     assert_eq!(record.bus.missed, 0);
@@ -98,7 +98,7 @@ fn the_same_seed_gives_the_same_bytes_and_another_seed_others() {
 
 #[test]
 fn whole_round_trips_are_repeated_as_long_as_they_fit() {
-    let two = one_trip() + round_trip().unwrap() + Time::from_ms(1500);
+    let two = one_trip() + sample().round_trip().unwrap() + Time::from_ms(1500);
     let record = run(Scenario::new(4, two));
     assert_good(&record);
     assert_eq!(record.releases.len(), 2);

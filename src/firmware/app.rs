@@ -25,6 +25,7 @@ mod app {
         configurator::Configurator,
         control::Control,
         counters::{self, Counts},
+        derived::{self, AXES},
         filters::{self, Handler},
         leds,
         log::{News, UPTIME_MS},
@@ -36,14 +37,14 @@ mod app {
     use canmaster::{
         Frame,
         boot::NetworkBoot,
-        design::{self, AXES},
+        design,
         id::{CobId, FunctionCode},
         master::{
-            self, AxisMap, Debounce, ExtendedClock, MasterOd, Put, Reception, Supervisor,
-            TPDOS_PER_AXIS, TpdoSlot, TxQueue,
+            AxisMap, Debounce, ExtendedClock, MasterOd, Put, Reception, Supervisor, TpdoSlot,
+            TxQueue,
         },
-        motion::{AxisCommand, Group, GroupEvent, experiment},
-        network::{Network, sample},
+        motion::{AxisCommand, Group, GroupEvent},
+        network::Network,
         nmt,
         time::{Duration, Instant},
     };
@@ -53,19 +54,19 @@ mod app {
         Config, can, pac::Interrupt, pins, reset_cause::ResetCause, timers, watchdog::Watchdog,
     };
 
-    type FrameQueue = Queue<Frame, { design::RX_QUEUE }>;
-    type NewsQueue = Queue<News, { design::LOG_QUEUE }>;
-    type OrderQueue = Queue<Order, { design::ORDER_QUEUE }>;
-    type EventQueue = Queue<GroupEvent, { design::LOG_QUEUE }>;
+    type FrameQueue = Queue<Frame, { design::rx_queue(AXES) }>;
+    type NewsQueue = Queue<News, { design::log_queue(AXES) }>;
+    type OrderQueue = Queue<Order, { design::order_queue(AXES) }>;
+    type EventQueue = Queue<GroupEvent, { design::log_queue(AXES) }>;
 
-    pub(crate) static NETWORK: &Network = &sample::SIX_EPOS4;
+    pub(crate) static NETWORK: &Network = &derived::NETWORK;
     pub(crate) static CLOCK: ExtendedClock = ExtendedClock::new();
 
     #[shared]
     struct Shared {
         od: MasterOd<AXES>,
         can_tx: can::Tx,
-        tx_queue: TxQueue<{ design::TX_QUEUE }>,
+        tx_queue: TxQueue<{ design::tx_queue(AXES) }>,
         control: Control,
         bus: can::ErrorState,
         commands: [AxisCommand; AXES],
@@ -123,7 +124,6 @@ mod app {
         axes_place: MaybeUninit<Axes> = MaybeUninit::uninit(),
         boot_place: MaybeUninit<NetworkBoot<AXES>> = MaybeUninit::uninit(),
         own_place: MaybeUninit<OwnNode> = MaybeUninit::uninit(),
-        lengths: [[u8; TPDOS_PER_AXIS]; AXES] = [[0; TPDOS_PER_AXIS]; AXES],
         network_queue: FrameQueue = Queue::new(),
         answer_queue: FrameQueue = Queue::new(),
         transfer_queue: FrameQueue = Queue::new(),
@@ -139,16 +139,12 @@ mod app {
             cx.device,
             &Config {
                 period_us: cycle_us,
-                deadline_us: design::TPDO_DEADLINE_US,
+                deadline_us: derived::TPDO_DEADLINE_US,
                 watchdog_ms: design::WATCHDOG_MS,
+                bit_timing: derived::BIT_TIMING,
                 filters: &filters::FILTERS,
             },
         );
-        // What the firmware exchanges with an axis and what the network
-        // describes has to be the same.
-        defmt::assert_eq!(NETWORK.nodes.len(), AXES);
-        defmt::assert!(NETWORK.nodes.iter().all(master::fits));
-        *cx.local.lengths = master::lengths(NETWORK);
 
         let (to_network, from_can) = cx.local.network_queue.split();
         let (answers_to, answers) = cx.local.answer_queue.split();
@@ -165,7 +161,7 @@ mod app {
         let boot = new_boot(cx.local.boot_place, own);
         (
             Shared {
-                od: MasterOd::new(cx.local.lengths),
+                od: MasterOd::new(&derived::TPDO_BYTES),
                 can_tx: board.can_tx,
                 tx_queue: TxQueue::new(),
                 control: Control::new(),
@@ -225,7 +221,7 @@ mod app {
         group: &'static mut MaybeUninit<Group<AXES>>,
         axes: &'static mut MaybeUninit<Axes>,
     ) -> &'static mut Axes {
-        let group = Group::new_in(group, &experiment::GROUP);
+        let group = Group::new_in(group, &derived::GROUP);
         axes.write(Axes::new(NETWORK, group))
     }
 

@@ -1,11 +1,13 @@
 //! From the TPDOs of one SYNC to the RPDOs of the next.
 
-use crate::control::Control;
+use crate::{
+    control::Control,
+    derived::{AXES, PDOS},
+};
 use canmaster::{
     Frame,
     cia402::StatusWord,
-    design::AXES,
-    master::{self, Cycle, Ramps, TpdoSlot},
+    master::{Cycle, Ramps, TPDOS_PER_AXIS, TpdoSlot},
     motion::{AxisCommand, AxisFeedback, Group, GroupEvent, GroupState, Request},
     network::Network,
 };
@@ -32,13 +34,13 @@ impl Axes {
 
     /// Takes in the TPDOs of a cycle, each through `tpdo`.
     pub(crate) fn read(&mut self, cycle: &Cycle, mut tpdo: impl FnMut(TpdoSlot) -> [u8; 8]) {
-        for (axis, feedback) in self.feedback.iter_mut().enumerate() {
+        for (axis, (feedback, pdos)) in self.feedback.iter_mut().zip(&PDOS).enumerate() {
             let (Some(first), Some(second)) = (TpdoSlot::new(axis, 0), TpdoSlot::new(axis, 1))
             else {
                 continue;
             };
             let fresh = !cycle.missing.contains(first) && !cycle.missing.contains(second);
-            *feedback = master::feedback(tpdo(first), tpdo(second), fresh);
+            *feedback = pdos.feedback(&[tpdo(first), tpdo(second)], fresh);
         }
     }
 
@@ -83,10 +85,12 @@ impl Axes {
     /// Hands the RPDOs of the next cycle to `send`.
     pub(crate) fn write(&mut self, mut send: impl FnMut(Frame)) {
         let due = self.ramps.due(&self.commands);
-        for ((node, command), ramps) in self.network.nodes.iter().zip(&self.commands).zip(due) {
-            send(master::rpdo1(node.id, command));
-            if ramps {
-                send(master::rpdo2(node.id, command));
+        let nodes = self.network.nodes.iter().zip(&PDOS);
+        for (((node, pdos), command), ramps) in nodes.zip(&self.commands).zip(due) {
+            for number in 0..TPDOS_PER_AXIS as u8 {
+                if !pdos.has_only_ramps(number) || ramps {
+                    pdos.rpdo(number, node.id, command).map(&mut send);
+                }
             }
         }
     }

@@ -1,8 +1,8 @@
 //! What the slower tasks tell the PDO producer and each other.
 
+use crate::derived::AXES;
 use canmaster::{
     boot::{Event, NetworkBoot},
-    design::AXES,
     motion::FaultCause,
     nmt,
 };

@@ -1,11 +1,16 @@
 //! What `sdo_configurator` does for the boot-up and for the board as a device,
 //! with what the tasks share.
 
-use crate::{app::app::NETWORK, configurator::Configurator, own_node::Mirror};
+use crate::{
+    app::app::NETWORK,
+    configurator::Configurator,
+    derived::{AXES, RPDOS_US},
+    own_node::Mirror,
+};
 use canmaster::{
     Frame,
     boot::{Action, NetworkBoot},
-    design::{self, AXES},
+    design,
     device::{Event, Setting},
     master::TxQueue,
     motion::{FaultCause, GroupEvent, GroupState},
@@ -124,7 +129,7 @@ impl Configurator<'_> {
         let latest_us = match sync.window() {
             0 => u16::MAX,
             // Nothing shorter than that is taken.
-            window => (window as u16).saturating_sub(design::RPDOS_US),
+            window => (window as u16).saturating_sub(RPDOS_US),
         };
         let shared = &mut self.shared;
         (&mut shared.control, &mut shared.od).lock(|control, od| {

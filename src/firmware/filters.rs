@@ -1,8 +1,8 @@
 //! Which frames are received, and what each is: the index of the filter that
 //! matched selects the handler.
 
+use crate::derived::NETWORK;
 use canmaster::id::{CobId, FunctionCode};
-use canmaster::network::sample;
 use nucleo_g474re::can::{Fifo, RangeFilter};
 
 /// What a received frame is.
@@ -47,7 +47,7 @@ pub(crate) static FILTERS: [RangeFilter; 9] = [
     nodes(FunctionCode::Emcy, Fifo::Fifo1),
     nodes(FunctionCode::SdoResponse, Fifo::Fifo1),
     nodes(FunctionCode::ErrorControl, Fifo::Fifo1),
-    one(CobId::of(FunctionCode::SdoRequest, sample::SIX_EPOS4.master.node).get()),
+    one(CobId::of(FunctionCode::SdoRequest, NETWORK.master.node).get()),
     one(CobId::TIME.get()),
     one(CobId::NMT.get()),
     one(CobId::LSS_SLAVE.get()),

@@ -13,6 +13,8 @@ mod control;
 #[cfg(target_os = "none")]
 mod counters;
 #[cfg(target_os = "none")]
+mod derived;
+#[cfg(target_os = "none")]
 mod duties;
 #[cfg(target_os = "none")]
 mod filters;
@@ -32,6 +34,9 @@ mod roll;
 mod transfer;
 #[cfg(target_os = "none")]
 mod wake;
+
+#[cfg(all(target_os = "none", not(feature = "firmware")))]
+compile_error!("the image needs the feature `firmware`; `cargo xtask build` makes it");
 
 #[cfg(target_os = "none")]
 use defmt_rtt as _;

@@ -8,14 +8,18 @@
 //! left, and one to all nodes waits until the axes, whose drives have heard it
 //! too, are off. Reset node and reset communication both start the board anew.
 
-use crate::{control::Control, log::News};
+use crate::{
+    control::Control,
+    derived::{AXES, PDOS, SYNC_LIMITS},
+    log::News,
+};
 use canmaster::{
     Frame, NodeId,
     boot::{Event, NetworkBoot},
-    design::{self, AXES},
+    design,
     device::{self, Description, Device, Identity, MasterError, Setting, Settings},
     emcy::EmcyCode,
-    master::{self, MasterOd, Notice, TpdoSlot, WrongLength},
+    master::{MasterOd, Notice, TpdoSlot, WrongLength},
     motion::{AxisCommand, FaultCause, GroupEvent, GroupState},
     network::Network,
     nmt::{Command, ErrorControl, NodeControl, State, Target},
@@ -40,7 +44,7 @@ fn description() -> Description {
             serial: nucleo_g474re::serial_number(),
             ..Identity::default()
         },
-        sync: design::SYNC_LIMITS,
+        sync: SYNC_LIMITS,
     }
 }
 
@@ -112,12 +116,11 @@ where
         };
         let command = self.commands.lock(|commands| commands.get(axis).copied());
         let command = command.unwrap_or_default();
-        let frame = match number {
-            1 => master::rpdo1(node, &command),
-            _ => master::rpdo2(node, &command),
-        };
+        let number = number.saturating_sub(1);
+        let pdos = PDOS.get(axis);
+        let frame = pdos.and_then(|pdos| pdos.rpdo(number, node, &command));
         let mut bytes = [0; 8];
-        for (byte, sent) in bytes.iter_mut().zip(frame.data()) {
+        for (byte, sent) in bytes.iter_mut().zip(frame.iter().flat_map(Frame::data)) {
             *byte = *sent;
         }
         bytes

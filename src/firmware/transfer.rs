@@ -4,9 +4,9 @@
 //! nothing from it. A node that boots again under the test is silent for the
 //! boot-up until the test has failed, which it does within its timeout.
 
+use crate::derived::TX_QUEUE;
 use canmaster::{
-    Frame, NodeId,
-    design::{self, TX_QUEUE},
+    Frame, NodeId, design,
     device::TransferTest,
     id::CobId,
     master::TxQueue,

@@ -1,11 +1,10 @@
-//! The PDOs of an axis as this master exchanges them every cycle:
+//! The PDOs of an axis as this master exchanges them every cycle: where in RPDO1,
+//! RPDO2, TPDO1 and TPDO2 each object lies follows from the network's mapping.
 //!
-//! | PDO | entries |
+//! | direction | objects |
 //! |---|---|
-//! | RPDO1 | controlword 6040h, target velocity 60FFh |
-//! | RPDO2 | profile acceleration 6083h, profile deceleration 6084h |
-//! | TPDO1 | statusword 6041h, position actual value 6064h |
-//! | TPDO2 | velocity actual value 606Ch, torque actual value 6077h |
+//! | to the drive | controlword 6040h, target velocity 60FFh, profile acceleration 6083h, profile deceleration 6084h |
+//! | from the drive | statusword 6041h, position 6064h, velocity 606Ch, torque 6077h (may be left out) |
 
 use super::od::TPDOS_PER_AXIS;
 use crate::frame::{Frame, MAX_DATA};
@@ -15,86 +14,224 @@ use crate::network::{Network, Node, Pdo};
 use crate::objects;
 use crate::pdo::MappingEntry;
 
-const BITS_PER_BYTE: u32 = 8;
+/// PDOs of each direction.
+const PDOS: usize = TPDOS_PER_AXIS;
 
-const fn mapped(at: Address, bits: u8) -> MappingEntry {
+const fn entry(at: Address, bits: u8) -> MappingEntry {
     MappingEntry::new(at.index.0, at.sub.0, bits)
 }
 
-const RPDO1: [MappingEntry; 2] = [
-    mapped(objects::CONTROLWORD, 16),
-    mapped(objects::TARGET_VELOCITY, 32),
-];
-const RPDO2: [MappingEntry; 2] = [
-    mapped(objects::PROFILE_ACCELERATION, 32),
-    mapped(objects::PROFILE_DECELERATION, 32),
-];
-const TPDO1: [MappingEntry; 2] = [
-    mapped(objects::STATUSWORD, 16),
-    mapped(objects::POSITION_ACTUAL, 32),
-];
-const TPDO2: [MappingEntry; 2] = [
-    mapped(objects::VELOCITY_ACTUAL, 32),
-    mapped(objects::TORQUE_ACTUAL, 16),
-];
+const CONTROLWORD: MappingEntry = entry(objects::CONTROLWORD, 16);
+const TARGET_VELOCITY: MappingEntry = entry(objects::TARGET_VELOCITY, 32);
+const ACCELERATION: MappingEntry = entry(objects::PROFILE_ACCELERATION, 32);
+const DECELERATION: MappingEntry = entry(objects::PROFILE_DECELERATION, 32);
+const STATUSWORD: MappingEntry = entry(objects::STATUSWORD, 16);
+const POSITION: MappingEntry = entry(objects::POSITION_ACTUAL, 32);
+const VELOCITY: MappingEntry = entry(objects::VELOCITY_ACTUAL, 32);
+const TORQUE: MappingEntry = entry(objects::TORQUE_ACTUAL, 16);
 
-/// Whether the PDOs of `node` are those of the table above.
-pub fn fits(node: &Node) -> bool {
-    let is = |pdos: &[Pdo], number: u8, expected: &[MappingEntry]| {
-        pdos.iter()
-            .any(|pdo| pdo.number == number && pdo.mapping == expected)
-    };
-    is(node.rpdos, 1, &RPDO1)
-        && is(node.rpdos, 2, &RPDO2)
-        && is(node.tpdos, 1, &TPDO1)
-        && is(node.tpdos, 2, &TPDO2)
+/// Where an object lies: from which bit of the PDOs on, put one behind the other
+/// with [`PDO_BITS`] each.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Place(u8);
+
+const PDO_BITS: u8 = u64::BITS as u8;
+
+/// An object that is not mapped lies behind all that is.
+const NOWHERE: Place = Place(PDO_BITS * PDOS as u8);
+
+impl Place {
+    /// The first place of `wanted` in these PDOs; `None`: not mapped.
+    const fn find(pdos: &[Pdo], wanted: MappingEntry) -> Option<Place> {
+        let mut left = pdos;
+        while let Some((pdo, others)) = left.split_first() {
+            let (mut entries, mut bit) = (pdo.mapping, 0);
+            while let Some((mapped, more)) = entries.split_first() {
+                if mapped.0 == wanted.0 && pdo.number as usize <= PDOS {
+                    return Some(Place(pdo.number.saturating_sub(1) * PDO_BITS + bit));
+                }
+                bit += mapped.bits();
+                entries = more;
+            }
+            left = others;
+        }
+        None
+    }
+
+    /// In which PDO, counted from 0.
+    const fn pdo(self) -> u8 {
+        self.0 / PDO_BITS
+    }
+
+    /// From which of its bits on.
+    const fn bit(self) -> u8 {
+        self.0 % PDO_BITS
+    }
+
+    /// The object and what follows it; 0 if it is not mapped.
+    #[inline(never)]
+    fn read(self, pdos: &[[u8; MAX_DATA]; PDOS]) -> u32 {
+        let bytes = pdos.get(usize::from(self.pdo()));
+        let word = u64::from_le_bytes(bytes.copied().unwrap_or_default());
+        (word >> self.bit()) as u32
+    }
 }
 
-/// The bytes of the TPDOs of each axis of `network`, as mapped; 0 where there
-/// is none.
-pub fn lengths<const AXES: usize>(network: &Network) -> [[u8; TPDOS_PER_AXIS]; AXES] {
-    let mut lengths = [[0; TPDOS_PER_AXIS]; AXES];
-    for (lengths, node) in lengths.iter_mut().zip(network.nodes) {
-        for (length, number) in lengths.iter_mut().zip(1..) {
-            let pdo = node.tpdos.iter().find(|pdo| pdo.number == number);
-            let entries = pdo.map_or(&[] as &[_], |pdo| pdo.mapping);
-            let bits: u32 = entries.iter().map(|entry| u32::from(entry.bits())).sum();
-            *length = (bits / BITS_PER_BYTE) as u8;
+/// The PDOs of one axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AxisPdos {
+    /// In the order of [`AxisCommand`].
+    commands: [Place; 4],
+    /// In the order of [`AxisFeedback`].
+    feedback: [Place; 4],
+    rpdo_bytes: [u8; PDOS],
+    tpdo_bytes: [u8; PDOS],
+}
+
+/// Whole bytes of the PDOs; 0 where there is none.
+const fn lengths(pdos: &[Pdo]) -> [u8; PDOS] {
+    let mut bytes = [0; PDOS];
+    let mut left = pdos;
+    while let Some((pdo, others)) = left.split_first() {
+        let (mut entries, mut bits) = (pdo.mapping, 0);
+        while let Some((mapped, more)) = entries.split_first() {
+            bits += mapped.bits();
+            entries = more;
+        }
+        let [first, second] = &mut bytes;
+        match pdo.number {
+            1 => *first = bits / u8::BITS as u8,
+            2 => *second = bits / u8::BITS as u8,
+            _ => {}
+        }
+        left = others;
+    }
+    bytes
+}
+
+impl AxisPdos {
+    /// Nothing is exchanged.
+    const NONE: AxisPdos = AxisPdos {
+        commands: [NOWHERE; 4],
+        feedback: [NOWHERE; 4],
+        rpdo_bytes: [0; PDOS],
+        tpdo_bytes: [0; PDOS],
+    };
+
+    /// The PDOs as `node` has them mapped. `None` if an object is missing that an
+    /// axis cannot be led without.
+    pub const fn of(node: &Node) -> Option<AxisPdos> {
+        let (
+            Some(controlword),
+            Some(target),
+            Some(acceleration),
+            Some(deceleration),
+            Some(statusword),
+            Some(position),
+            Some(velocity),
+        ) = (
+            Place::find(node.rpdos, CONTROLWORD),
+            Place::find(node.rpdos, TARGET_VELOCITY),
+            Place::find(node.rpdos, ACCELERATION),
+            Place::find(node.rpdos, DECELERATION),
+            Place::find(node.tpdos, STATUSWORD),
+            Place::find(node.tpdos, POSITION),
+            Place::find(node.tpdos, VELOCITY),
+        )
+        else {
+            return None;
+        };
+        let torque = match Place::find(node.tpdos, TORQUE) {
+            Some(place) => place,
+            None => NOWHERE,
+        };
+        Some(AxisPdos {
+            commands: [controlword, target, acceleration, deceleration],
+            feedback: [statusword, position, velocity, torque],
+            rpdo_bytes: lengths(node.rpdos),
+            tpdo_bytes: lengths(node.tpdos),
+        })
+    }
+
+    /// Those of every axis of `network`. `None` if there are not `AXES`, or an
+    /// object is missing that an axis cannot be led without.
+    pub const fn of_all<const AXES: usize>(network: &Network) -> Option<[AxisPdos; AXES]> {
+        let mut all = [AxisPdos::NONE; AXES];
+        let (mut left, mut nodes): (&mut [AxisPdos], &[Node]) = (&mut all, network.nodes);
+        if left.len() != nodes.len() {
+            return None;
+        }
+        while let (Some((pdos, more)), Some((node, others))) =
+            (left.split_first_mut(), nodes.split_first())
+        {
+            *pdos = match AxisPdos::of(node) {
+                Some(found) => found,
+                None => return None,
+            };
+            (left, nodes) = (more, others);
+        }
+        Some(all)
+    }
+
+    /// The bytes of the TPDOs of each axis; 0 where there is none.
+    pub const fn tpdo_bytes<const AXES: usize>(
+        all: &[AxisPdos; AXES],
+    ) -> [[u8; TPDOS_PER_AXIS]; AXES] {
+        let mut bytes = [[0; TPDOS_PER_AXIS]; AXES];
+        let (mut left, mut axes): (&mut [[u8; TPDOS_PER_AXIS]], &[AxisPdos]) = (&mut bytes, all);
+        while let (Some((of_axis, more)), Some((axis, others))) =
+            (left.split_first_mut(), axes.split_first())
+        {
+            *of_axis = axis.tpdo_bytes;
+            (left, axes) = (more, others);
+        }
+        bytes
+    }
+
+    /// What the TPDOs of the axis say. `fresh`: all came with this SYNC.
+    pub fn feedback(&self, tpdos: &[[u8; MAX_DATA]; PDOS], fresh: bool) -> AxisFeedback {
+        let [statusword, position, velocity, torque] = self.feedback.map(|at| at.read(tpdos));
+        AxisFeedback {
+            statusword: statusword as u16,
+            position: position as i32,
+            velocity: velocity as i32,
+            torque: torque as i16,
+            fresh,
         }
     }
-    lengths
-}
 
-/// What the two TPDOs of an axis say. `fresh`: both came with this SYNC.
-pub fn feedback(tpdo1: [u8; MAX_DATA], tpdo2: [u8; MAX_DATA], fresh: bool) -> AxisFeedback {
-    let [s0, s1, p0, p1, p2, p3, ..] = tpdo1;
-    let [v0, v1, v2, v3, t0, t1, ..] = tpdo2;
-    AxisFeedback {
-        statusword: u16::from_le_bytes([s0, s1]),
-        position: i32::from_le_bytes([p0, p1, p2, p3]),
-        velocity: i32::from_le_bytes([v0, v1, v2, v3]),
-        torque: i16::from_le_bytes([t0, t1]),
-        fresh,
+    /// Whether the RPDO `number`, counted from 0, carries nothing but ramps: it
+    /// is sent when they change.
+    pub fn has_only_ramps(&self, number: u8) -> bool {
+        let [controlword, velocity, ..] = &self.commands;
+        controlword.pdo() != number && velocity.pdo() != number
     }
-}
 
-/// RPDO1 for `node`.
-pub fn rpdo1(node: NodeId, command: &AxisCommand) -> Frame {
-    let id = CobId::of(FunctionCode::Rpdo1, node);
-    let [c0, c1] = command.controlword.to_le_bytes();
-    let [v0, v1, v2, v3] = command.velocity.to_le_bytes();
-    // Six bytes always fit.
-    Frame::data_frame(id, &[c0, c1, v0, v1, v2, v3]).unwrap_or(Frame::empty(id))
-}
-
-/// RPDO2 for `node`.
-pub fn rpdo2(node: NodeId, command: &AxisCommand) -> Frame {
-    let [a0, a1, a2, a3] = command.acceleration.to_le_bytes();
-    let [d0, d1, d2, d3] = command.deceleration.to_le_bytes();
-    Frame::full(
-        CobId::of(FunctionCode::Rpdo2, node),
-        [a0, a1, a2, a3, d0, d1, d2, d3],
-    )
+    /// The RPDO `number`, counted from 0, for `node`. `None`: it has none.
+    #[inline(never)]
+    pub fn rpdo(&self, number: u8, node: NodeId, command: &AxisCommand) -> Option<Frame> {
+        let function = if number == 0 {
+            FunctionCode::Rpdo1
+        } else {
+            FunctionCode::Rpdo2
+        };
+        let length = usize::from(*self.rpdo_bytes.get(usize::from(number))?);
+        let values = [
+            u32::from(command.controlword),
+            command.velocity as u32,
+            command.acceleration,
+            command.deceleration,
+        ];
+        let mut word = 0;
+        for (at, value) in self.commands.iter().zip(values) {
+            if at.pdo() == number {
+                word |= u64::from(value) << at.bit();
+            }
+        }
+        let bytes = word.to_le_bytes();
+        let data = bytes.get(..length).filter(|data| !data.is_empty())?;
+        Frame::data_frame(CobId::of(function, node), data)
+    }
 }
 
 #[cfg(test)]
@@ -102,33 +239,41 @@ mod tests {
     use super::*;
     use crate::network::sample::SIX_EPOS4;
 
-    #[test]
-    fn the_sample_network_has_these_pdos() {
-        assert!(SIX_EPOS4.nodes.iter().all(fits));
-        assert_eq!(lengths::<6>(&SIX_EPOS4), [[6, 6]; 6]);
-        // A master of more axes than nodes expects nothing from the rest.
-        assert_eq!(lengths::<7>(&SIX_EPOS4)[6], [0, 0]);
+    fn pdos() -> [AxisPdos; 6] {
+        AxisPdos::of_all(&SIX_EPOS4).unwrap()
     }
 
     #[test]
+    fn the_sample_network_has_these_pdos() {
+        assert_eq!(AxisPdos::tpdo_bytes(&pdos()), [[6, 6]; 6]);
+        assert_eq!(AxisPdos::of_all::<7>(&SIX_EPOS4), None);
+    }
+
+    const COMMAND: AxisCommand = AxisCommand {
+        controlword: 0x000F,
+        velocity: -1200,
+        acceleration: 1500,
+        deceleration: 0x0102_0304,
+    };
+
+    #[test]
     fn golden_bytes_both_ways() {
-        let command = AxisCommand {
-            controlword: 0x000F,
-            velocity: -1200,
-            acceleration: 1500,
-            deceleration: 0x0102_0304,
-        };
+        let [pdos, ..] = pdos();
         let node = NodeId::constant::<3>();
-        let frame = rpdo1(node, &command);
+        let frame = pdos.rpdo(0, node, &COMMAND).unwrap();
         assert_eq!(frame.id().get(), 0x203);
         assert_eq!(frame.data(), [0x0F, 0x00, 0x50, 0xFB, 0xFF, 0xFF]);
-        let frame = rpdo2(node, &command);
+        let frame = pdos.rpdo(1, node, &COMMAND).unwrap();
         assert_eq!(frame.id().get(), 0x303);
         assert_eq!(frame.data(), [0xDC, 0x05, 0, 0, 4, 3, 2, 1]);
+        assert_eq!(pdos.rpdo(2, node, &COMMAND), None);
+        assert!(!pdos.has_only_ramps(0) && pdos.has_only_ramps(1));
 
-        let got = feedback(
-            [0x37, 0x16, 0xFE, 0xFF, 0xFF, 0xFF, 0xAA, 0xAA],
-            [0xE8, 0x03, 0, 0, 0x9C, 0xFF, 0xAA, 0xAA],
+        let got = pdos.feedback(
+            &[
+                [0x37, 0x16, 0xFE, 0xFF, 0xFF, 0xFF, 0xAA, 0xAA],
+                [0xE8, 0x03, 0, 0, 0x9C, 0xFF, 0xAA, 0xAA],
+            ],
             true,
         );
         let expected = AxisFeedback {
@@ -139,5 +284,48 @@ mod tests {
             fresh: true,
         };
         assert_eq!(got, expected);
+    }
+
+    /// Another order, another division, a gap, and no torque.
+    #[test]
+    fn another_mapping() {
+        const OTHER: MappingEntry = MappingEntry::new(0x6061, 0, 8);
+        const fn pdo(number: u8, mapping: &'static [MappingEntry]) -> Pdo {
+            Pdo {
+                number,
+                transmission: crate::pdo::Transmission::Synchronous(1),
+                mapping,
+            }
+        }
+        const RPDOS: &[Pdo] = &[
+            pdo(2, &[TARGET_VELOCITY, CONTROLWORD]),
+            pdo(1, &[DECELERATION, ACCELERATION]),
+        ];
+        const TPDOS: &[Pdo] = &[
+            pdo(1, &[OTHER, VELOCITY]),
+            pdo(2, &[POSITION, OTHER, STATUSWORD]),
+        ];
+        let node = Node {
+            rpdos: RPDOS,
+            tpdos: TPDOS,
+            ..crate::network::sample::epos4(NodeId::constant::<7>(), "axis 7")
+        };
+        let pdos = AxisPdos::of(&node).unwrap();
+        let frame = pdos.rpdo(0, node.id, &COMMAND).unwrap();
+        assert_eq!(frame.data(), [4, 3, 2, 1, 0xDC, 0x05, 0, 0]);
+        let frame = pdos.rpdo(1, node.id, &COMMAND).unwrap();
+        assert_eq!(frame.data(), [0x50, 0xFB, 0xFF, 0xFF, 0x0F, 0x00]);
+        assert!(pdos.has_only_ramps(0) && !pdos.has_only_ramps(1));
+        let tpdos = [
+            [3, 0xE8, 0x03, 0, 0, 0, 0, 0],
+            [0xFE, 0xFF, 0xFF, 0xFF, 3, 0x37, 0x16, 0],
+        ];
+        let got = pdos.feedback(&tpdos, false);
+        assert_eq!((got.statusword, got.position), (0x1637, -2));
+        assert_eq!((got.velocity, got.torque), (1000, 0));
+        assert_eq!(AxisPdos::tpdo_bytes(&[pdos]), [[5, 7]]);
+
+        let blind = Node { tpdos: &[], ..node };
+        assert_eq!(AxisPdos::of(&blind), None);
     }
 }

@@ -16,7 +16,7 @@ mod supervisor;
 mod tx_queue;
 
 pub use axis_map::AxisMap;
-pub use axis_pdo::{feedback, fits, lengths, rpdo1, rpdo2};
+pub use axis_pdo::AxisPdos;
 pub use clock::ExtendedClock;
 pub use debounce::Debounce;
 pub use od::{Cycle, MasterOd, Reception, TPDOS_PER_AXIS, TpdoSlot, TpdoSlots, WrongLength};

@@ -60,6 +60,22 @@ impl TpdoSlots {
         })
     }
 
+    /// Those that have bytes.
+    const fn with_bytes(lengths: &[[u8; TPDOS_PER_AXIS]]) -> TpdoSlots {
+        let (mut bits, mut bit, mut left) = (0, 1, lengths);
+        while let Some(([first, second], others)) = left.split_first() {
+            if *first > 0 {
+                bits |= bit;
+            }
+            if *second > 0 {
+                bits |= bit << 1;
+            }
+            bit <<= TPDOS_PER_AXIS;
+            left = others;
+        }
+        TpdoSlots(bits)
+    }
+
     /// Whether it holds `slot`.
     pub const fn contains(self, slot: TpdoSlot) -> bool {
         self.0 & slot.bit() != 0
@@ -135,7 +151,7 @@ impl<const AXES: usize> MasterOd<AXES> {
             sync_producer: false,
             sync_count: 0,
             sync_counter: SyncCounter::NONE,
-            expected: TpdoSlots::all_of(AXES),
+            expected: TpdoSlots::with_bytes(lengths),
             received: TpdoSlots::NONE,
             open: false,
             overruns: 0,
@@ -290,6 +306,9 @@ mod tests {
         }
         assert_eq!(TpdoSlots(all), TpdoSlots::all_of(16));
         assert_eq!(TpdoSlots::all_of(6).iter().count(), 12);
+        assert_eq!(TpdoSlots::with_bytes(&[[6, 6]; 16]), TpdoSlots::all_of(16));
+        let some = TpdoSlots::with_bytes(&[[8, 0], [0, 1]]);
+        assert!(some.iter().eq([slot(0, 0), slot(1, 1)]));
     }
 
     #[test]

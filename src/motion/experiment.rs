@@ -1,94 +1,215 @@
-//! The motion program of the firmware: six motors in three pairs.
+//! The motion program of the firmware: motors in pairs, there and back.
 //!
-//! Each pair gets one command and must start and stop in step: axes 1 and 3,
-//! axes 2 and 4, axes 5 and 6, each pair with its own target, speed and ramps.
-//! There, a pause, and back.
+//! Each pair gets one command and must start and stop in step: of six axes 1
+//! and 3, 2 and 4, 5 and 6, each pair with its own target, speed and ramps. There,
+//! a pause, and back. More axes repeat this by sixes; of what is left over, two
+//! are a pair and an odd one goes alone.
 //!
 //! The final decelerations are chosen so that the moment at which an axis falls
 //! below 5 rpm (stopped, by the project's definition) lies on the reference's
 //! ramp: at 800 rpm/s it is 6 ms before the end of the ramp, and the tail of a
 //! velocity loop of 10 ms, 8 rpm when the ramp ends, is cut by the advance.
+//!
+//! Everything is worked out by the compiler: [`steps`] and [`group`] are for
+//! statics.
 
 use super::group::{AxisConfig, GroupConfig};
 use super::position_control::Tuning;
 use super::program::{AxisMove, Program, Step};
 use crate::time::Duration;
 
-/// Increments per turn of the motors' encoders: 500 lines, four edges.
-const TURN: i32 = 2000;
-
-/// There and back of one pair.
-const fn part(
-    set: u8,
-    turns: i32,
-    velocity: u32,
-    acceleration: u32,
-    deceleration: u32,
-) -> Option<AxisMove> {
-    Some(AxisMove {
-        target: turns * TURN,
-        velocity,
-        acceleration,
-        deceleration,
-        set,
-    })
+/// A motor with its encoder, gear and limits, as the network describes them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Motor {
+    /// Increments of the encoder (6064h) for a turn of the motor.
+    pub increments_per_turn: u32,
+    /// Turns of the motor for turns of the load.
+    pub gear: (u32, u32),
+    /// No faster, rpm of the motor (607Fh).
+    pub max_speed: u32,
+    /// No harder, rpm/s of the motor (60C5h).
+    pub max_acceleration: u32,
+    /// No farther from home, increments (607Dh).
+    pub max_travel: u32,
 }
 
-/// One move of all six axes from what the three pairs do.
-const fn pairs(
-    first: Option<AxisMove>,
-    second: Option<AxisMove>,
-    third: Option<AxisMove>,
-) -> Step<6> {
-    Step::Move([first, second, first, second, third, third])
+impl Motor {
+    /// 500 lines, four edges, no gear, and the limits of the sample network.
+    pub const SAMPLE: Motor = Motor {
+        increments_per_turn: 2000,
+        gear: (1, 1),
+        max_speed: 3000,
+        max_acceleration: 20_000,
+        max_travel: i32::MAX as u32,
+    };
+
+    /// The motor with its drive as the group leads it.
+    const fn config(&self, cycle: Duration) -> AxisConfig {
+        let turn = self.increments_per_turn;
+        AxisConfig {
+            increments_per_turn: turn,
+            velocity_max: least(VELOCITY_MAX, self.max_speed),
+            acceleration_max: least(ACCELERATION_MAX, self.max_acceleration),
+            travel_max: least(TRAVEL_MAX.saturating_mul(turn), self.max_travel),
+            // A quarter turn. A velocity loop 5 ms slower than assumed is 300
+            // increments late at 1800 rpm until the position loop has caught up.
+            following_error_max: turn / 4,
+            in_position: 2,
+            tuning: Tuning::for_cycle(cycle),
+        }
+    }
+
+    /// There and back: what of the part `turns` of the load come to, within the
+    /// limits of the axis.
+    const fn target(&self, turns: i32) -> i32 {
+        let motor = turns as i64 * self.increments_per_turn as i64 * self.gear.0 as i64;
+        let increments = motor / self.gear.1 as i64;
+        let most = self.config(Duration::from_millis(1)).travel_max as i64;
+        if increments > most {
+            most as i32
+        } else if increments < -most {
+            -most as i32
+        } else {
+            increments as i32
+        }
+    }
+}
+
+/// 20 % above the fastest move, rpm: room for the position loop.
+const VELOCITY_MAX: u32 = 2200;
+/// Twice the steepest ramp of the program, rpm/s.
+const ACCELERATION_MAX: u32 = 4000;
+/// Turns of the motor from home.
+const TRAVEL_MAX: u32 = 1000;
+
+const fn least(a: u32, b: u32) -> u32 {
+    if a < b { a } else { b }
+}
+
+/// What one pair does in one move: turns, rpm, rpm/s up, rpm/s down.
+struct Part(i32, u32, u32, u32);
+
+/// Axes of a pattern, and its pairs.
+const AXES: usize = 6;
+const PAIRS: u8 = 3;
+/// There.
+const THERE: [Part; PAIRS as usize] = [
+    Part(20, 1200, 1500, 800),
+    Part(-16, 900, 1000, 600),
+    Part(30, 1500, 2000, 1000),
+];
+/// And back.
+const BACK: [Part; PAIRS as usize] = [
+    Part(0, 1000, 1200, 700),
+    Part(0, 1100, 1500, 800),
+    Part(0, 1800, 1600, 900),
+];
+/// Between the two.
+const DWELL: Duration = Duration::from_millis(500);
+
+/// The part that an axis plays among `axes`, both counted from 0: which of a
+/// pattern's pairs it belongs to.
+const fn pair(axis: usize, axes: usize) -> u8 {
+    let two_left = axes - axis / AXES * AXES == 2;
+    match axis % AXES {
+        0 | 2 => 0,
+        1 if two_left => 0,
+        1 | 3 => 1,
+        _ => 2,
+    }
+}
+
+/// One move of all axes.
+const fn step<const N: usize>(motors: &[Motor; N], parts: &[Part; PAIRS as usize]) -> Step<N> {
+    let [first, second, third] = parts;
+    let mut moves = [None; N];
+    let mut axis = 0;
+    let (mut left, mut given): (&mut [Option<AxisMove>], &[Motor]) = (&mut moves, motors);
+    while let (Some((part, more)), Some((motor, others))) =
+        (left.split_first_mut(), given.split_first())
+    {
+        let pair = pair(axis, N);
+        let Part(turns, velocity, acceleration, deceleration) = match pair {
+            0 => first,
+            1 => second,
+            _ => third,
+        };
+        let speed = least(VELOCITY_MAX, motor.max_speed);
+        let ramp = least(ACCELERATION_MAX, motor.max_acceleration) / 2;
+        *part = Some(AxisMove {
+            target: motor.target(*turns),
+            velocity: least(*velocity, speed - speed / 6),
+            acceleration: least(*acceleration, ramp),
+            deceleration: least(*deceleration, ramp),
+            set: (axis / AXES) as u8 * PAIRS + pair + 1,
+        });
+        (left, given) = (more, others);
+        axis += 1;
+    }
+    Step::Move(moves)
 }
 
 /// There, a pause, and back; see the module.
-pub const PROGRAM: Program<6> = Program {
-    name: "three pairs, there and back",
-    steps: &[
-        pairs(
-            part(1, 20, 1200, 1500, 800),
-            part(2, -16, 900, 1000, 600),
-            part(3, 30, 1500, 2000, 1000),
-        ),
-        Step::Dwell(Duration::from_millis(500)),
-        pairs(
-            part(1, 0, 1000, 1200, 700),
-            part(2, 0, 1100, 1500, 800),
-            part(3, 0, 1800, 1600, 900),
-        ),
-    ],
-};
+pub const fn steps<const N: usize>(motors: &[Motor; N]) -> [Step<N>; 3] {
+    [
+        step(motors, &THERE),
+        Step::Dwell(DWELL),
+        step(motors, &BACK),
+    ]
+}
 
-/// One of the six motors with its drive.
-const AXIS: AxisConfig = AxisConfig {
-    increments_per_turn: TURN as u32,
-    // 20 % above the fastest move, for the position loop.
-    velocity_max: 2200,
-    // Twice the steepest ramp of the program.
-    acceleration_max: 4000,
-    travel_max: 1000 * TURN as u32,
-    // A quarter turn. A velocity loop 5 ms slower than assumed is 300 increments
-    // late at 1800 rpm until the position loop has caught up.
-    following_error_max: TURN as u32 / 4,
-    in_position: 2,
-    tuning: Tuning::MILLISECONDS_10,
-};
+/// How much steeper than the reference the drive's ramps are: at cycles up to 10 ms
+/// by half. A longer cycle would wait longer at the end of each ramp, so that the
+/// axis would be ahead.
+const fn ramp_percent(cycle: Duration) -> u32 {
+    const WHOLE: u32 = 100;
+    const MORE: u32 = 50;
+    const LONG_US: u32 = 10_000;
+    let us = cycle.as_micros();
+    WHOLE + MORE * LONG_US / if us > LONG_US { us } else { LONG_US }
+}
 
-/// The group of six axes that runs [`PROGRAM`], at a cycle of 10 ms.
-pub static GROUP: GroupConfig<6> = GroupConfig {
-    cycle: Duration::from_millis(10),
-    axes: [AXIS; 6],
-    program: PROGRAM,
-    // A drive may wait for standstill for 1 s on the way down (30E0h:3).
-    enable_timeout: Duration::from_millis(2000),
-    missing_tpdo_max: 3,
-    stop_deceleration: 3000,
-    // 606Ch carries 1 rpm of noise, the creeping of the position loop 3 rpm.
-    standstill_rpm: 6,
-    settle_cycles: 5,
-    settle_timeout: Duration::from_millis(2000),
-    ramp_percent: 150,
-    ramp_min: 1000,
-};
+/// The group of these axes that runs `steps`.
+pub const fn group<const N: usize>(
+    motors: &[Motor; N],
+    cycle: Duration,
+    missing_tpdo_max: u8,
+    steps: &'static [Step<N>],
+) -> GroupConfig<N> {
+    let mut axes = [Motor::SAMPLE.config(cycle); N];
+    let (mut left, mut given): (&mut [AxisConfig], &[Motor]) = (&mut axes, motors);
+    while let (Some((axis, more)), Some((motor, others))) =
+        (left.split_first_mut(), given.split_first())
+    {
+        *axis = motor.config(cycle);
+        (left, given) = (more, others);
+    }
+    GroupConfig {
+        cycle,
+        axes,
+        program: Program {
+            name: "pairs, there and back",
+            steps,
+        },
+        // A drive may wait for standstill for 1 s on the way down (30E0h:3).
+        enable_timeout: Duration::from_millis(2000),
+        missing_tpdo_max,
+        stop_deceleration: 3000,
+        // 606Ch carries 1 rpm of noise, the creeping of the position loop 3 rpm.
+        standstill_rpm: 6,
+        settle_cycles: 5,
+        settle_timeout: Duration::from_millis(2000),
+        ramp_percent: ramp_percent(cycle),
+        ramp_min: 1000,
+    }
+}
+
+static SAMPLE_STEPS: [Step<6>; 3] = steps(&[Motor::SAMPLE; 6]);
+
+/// The group of six axes of the sample network, at a cycle of 10 ms.
+pub static GROUP: GroupConfig<6> = group(
+    &[Motor::SAMPLE; 6],
+    Duration::from_millis(10),
+    3,
+    &SAMPLE_STEPS,
+);

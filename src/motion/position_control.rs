@@ -18,6 +18,7 @@
 
 use super::profile::Setpoint;
 use super::scale::Scale;
+use crate::time::Duration;
 
 /// Properties of the position loop of one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,6 +52,22 @@ impl Tuning {
         creep_rpm: 3.0,
         dead_band: 1,
     };
+
+    /// For the same drives at another cycle: the gain falls with the delay of the
+    /// loop, 1.5 cycles and the lag.
+    pub const fn for_cycle(cycle: Duration) -> Tuning {
+        /// The product of gain and delay, per mille.
+        const GAIN_BY_DELAY: f32 = 300.0;
+        /// The lag that a drive is taken to have, in milliseconds.
+        const LAG_MS: f32 = 10.0;
+        const CYCLES: f32 = 1.5;
+        const US_PER_MS: f32 = 1000.0;
+        let cycle_ms = cycle.as_micros() as f32 / US_PER_MS;
+        Tuning {
+            gain: GAIN_BY_DELAY / (CYCLES * cycle_ms + LAG_MS),
+            ..Tuning::MILLISECONDS_10
+        }
+    }
 }
 
 /// What an axis rolls on after an advanced ramp, over deceleration times lag
@@ -182,7 +199,6 @@ fn round(x: f32) -> i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::time::Duration;
 
     /// Increments per cycle that are 1 rpm with 2000 increments and 10 ms.
     const RPM: f32 = 1.0 / 3.0;
@@ -210,6 +226,13 @@ mod tests {
             ahead: at,
             beyond: at.velocity,
         }
+    }
+
+    #[test]
+    fn the_tuning_follows_the_cycle() {
+        let of = |ms| Tuning::for_cycle(Duration::from_millis(ms));
+        assert_eq!(of(10), Tuning::MILLISECONDS_10);
+        assert!(of(2).gain > 20.0 && of(50).gain < 4.0);
     }
 
     #[test]

@@ -89,7 +89,8 @@ const START_VALUES: &[ConfigWrite] = &[
     ConfigWrite::u16(objects::ABORT_CONNECTION_OPTION, QUICK_STOP_ON_LOST_MASTER),
 ];
 
-const fn epos4(id: NodeId, name: &'static str) -> Node {
+/// One of the drives.
+pub(crate) const fn epos4(id: NodeId, name: &'static str) -> Node {
     Node {
         id,
         name,

@@ -1,6 +1,6 @@
 //! Arrivals, and pairs that stop together, over many seeds.
 
-use canmaster::motion::experiment::{GROUP, PROGRAM};
+use canmaster::motion::experiment::GROUP;
 use canmaster::motion::{GroupEvent, GroupState, Step};
 
 use crate::rig::{AXES, CYCLE_MS, READY, Rig};
@@ -38,7 +38,7 @@ fn round_trip(rig: &mut Rig, homes: &[f64; AXES]) -> Worst {
     let mut from = [0.0; AXES];
     let start = rig.cycle;
     rig.release();
-    for step in PROGRAM.steps {
+    for step in GROUP.program.steps {
         let Step::Move(moves) = step else { continue };
         rig.observe_anew();
         let mut arrived = 0;
@@ -98,7 +98,7 @@ fn arrivals_are_exact_and_pairs_stop_together() {
     assert!(worst.error <= 2.0, "{worst:?}");
     assert!(worst.overshoot <= 2.0, "{worst:?}");
     assert!(worst.apart_ms < 10.0, "{worst:?}");
-    let expected = f64::from(PROGRAM.duration(&GROUP).unwrap().as_millis());
+    let expected = f64::from(GROUP.program.duration(&GROUP).unwrap().as_millis());
     assert!(
         (worst.trip_ms - expected).abs() < 0.05 * expected,
         "{worst:?} {expected}"

@@ -2,7 +2,7 @@
 //! log.
 
 use canmaster::cia402::{Goal, State, StatusWord, Timeout};
-use canmaster::motion::experiment::{GROUP, PROGRAM};
+use canmaster::motion::experiment::GROUP;
 use canmaster::motion::{
     AxisCommand, AxisFeedback, AxisMove, FaultCause, Group, GroupConfig, GroupEvent, GroupState,
     Limit, PlanError, Program, Refusal, Request, Step,
@@ -38,7 +38,7 @@ fn duration_of_one_move() {
 
 #[test]
 fn the_experiment_is_what_it_says() {
-    let Some(Step::Move(there)) = PROGRAM.steps.first() else {
+    let Some(Step::Move(there)) = GROUP.program.steps.first() else {
         panic!("the first step moves");
     };
     let there = there.map(|part| part.unwrap());
@@ -48,7 +48,7 @@ fn the_experiment_is_what_it_says() {
     for part in there {
         assert!(part.target.unsigned_abs() >= 10 * GROUP.axes[0].increments_per_turn);
     }
-    let Some(Step::Move(back)) = PROGRAM.steps.last() else {
+    let Some(Step::Move(back)) = GROUP.program.steps.last() else {
         panic!("the last step moves");
     };
     assert!(back.iter().all(|part| part.unwrap().target == 0));

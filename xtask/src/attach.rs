@@ -5,7 +5,9 @@ use std::process::{Command, ExitCode};
 
 use anyhow::{Context, Result, bail};
 
-use crate::{cargo, firmware};
+use crate::cargo;
+use crate::cli::MachineOptions;
+use crate::machine::Checked;
 
 /// The board's chip as probe-rs calls it.
 const CHIP: &str = "STM32G474RETx";
@@ -18,22 +20,23 @@ const INSTALL: &str = "probe-rs is not installed. Install it with one of
 and, on Linux, its udev rules: https://probe.rs/docs/getting-started/probe-setup/";
 
 /// `cargo xtask flash`: write the image, start it, show its log.
-pub(crate) fn flash() -> Result<ExitCode> {
-    probe_rs("run")
+pub(crate) fn flash(options: &MachineOptions) -> Result<ExitCode> {
+    probe_rs("run", options)
 }
 
 /// `cargo xtask attach`: show the log of a running board, which goes on
 /// undisturbed.
 pub(crate) fn attach() -> Result<ExitCode> {
-    probe_rs("attach")
+    // Whatever machine it was built for: the log's strings are the same.
+    probe_rs("attach", &MachineOptions { network: None })
 }
 
-fn probe_rs(subcommand: &str) -> Result<ExitCode> {
+fn probe_rs(subcommand: &str, options: &MachineOptions) -> Result<ExitCode> {
     // Looked for first: nobody wants to wait for a build to be told this.
     if Command::new("probe-rs").arg("--version").output().is_err() {
         bail!("{INSTALL}");
     }
-    let elf = firmware::build()?;
+    let elf = Checked::read(options.network.as_deref())?.build()?;
     let mut command = arguments(subcommand, &elf);
     let status = command
         .status()

@@ -12,6 +12,7 @@ use canmaster::nmt::{NodeControl, State};
 use canmaster::objects::SERIAL_NUMBER;
 use canmaster::od;
 use canmaster::sdo::AbortCode;
+use canmaster::sync::SyncLimits;
 use canmaster::time::{Duration, Instant};
 use canmaster_network::eds::{DeviceInfo, Eds, Entry, Number, Object, ObjectKind};
 use canmaster_network::model::Machine;
@@ -68,7 +69,7 @@ pub(crate) fn eds(machine: &Machine, bus: usize, network: &'static Network) -> E
         hardware: design::HARDWARE_VERSION,
         software: env!("CARGO_PKG_VERSION"),
         identity: Identity::default(),
-        sync: design::SYNC_LIMITS,
+        sync: SyncLimits::NONE,
     };
     let mut device: Device<NODES> = Device::new(description, network, TIMEOUT);
     device.set_state(State::PreOperational, &mut Bench, Instant::ZERO);

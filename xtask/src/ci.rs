@@ -5,9 +5,11 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 
-use crate::cli::{Bench, BenchOptions, CiOptions, LogLevel, RunOptions, TestOptions};
+use crate::cli::{
+    Bench, BenchOptions, CiOptions, LogLevel, MachineOptions, RunOptions, TestOptions,
+};
 use crate::image::{Budget, ImageSize};
-use crate::{bench, cargo, conformance, firmware, interop, run, size, toolchain};
+use crate::{bench, cargo, conformance, firmware, interop, networks, run, size, toolchain};
 
 /// A name and what is done.
 type Step = (&'static str, fn() -> Result<()>);
@@ -21,6 +23,9 @@ const TESTS: &str = "tests";
 /// `cargo xtask test`: the image, then every test of the workspace.
 pub(crate) fn test(options: &TestOptions) -> Result<ExitCode> {
     tests(&options.args)?;
+    if options.args.is_empty() {
+        networks::four()?;
+    }
     Ok(ExitCode::SUCCESS)
 }
 
@@ -39,11 +44,12 @@ fn tests(args: &[String]) -> Result<()> {
 /// `cargo xtask ci`: everything that has to pass, in the order of how soon it
 /// fails.
 pub(crate) fn command(options: &CiOptions) -> Result<ExitCode> {
-    let steps: [Step; 11] = [
+    let steps: [Step; 12] = [
         ("format", format),
         ("lints, host", lints_host),
         ("lints, board", lints_target),
         (TESTS, || tests(&[])),
+        ("networks", networks::four),
         ("sizes", sizes),
         ("one run", one_run),
         ("bench startup", || benched(Bench::Startup)),
@@ -105,6 +111,7 @@ fn sizes() -> Result<()> {
 
 fn one_run() -> Result<()> {
     let options = RunOptions {
+        machine: MachineOptions { network: None },
         factory: false,
         stranger: false,
         seconds: None,

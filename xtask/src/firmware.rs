@@ -1,11 +1,13 @@
 //! Building the image that is flashed, and that the emulated board boots.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Stdio};
 
 use anyhow::{Context, Result, bail};
 use serde::Deserialize;
 
+use crate::cli::MachineOptions;
+use crate::machine::Checked;
 use crate::{cargo, toolchain};
 
 /// Name of the binary.
@@ -13,14 +15,17 @@ const BINARY: &str = "canmaster";
 /// Where tests find an image that is built already.
 pub(crate) const IMAGE_VARIABLE: &str = "CANMASTER_ELF";
 
+/// Tells the build script of another description of the machine.
+const NETWORK_VARIABLE: &str = "CANMASTER_NETWORK";
+
 /// The image holds every log line; the host filters.
 const DEFMT_LOG: &str = "trace";
 /// Room for the burst of lines while six drives are configured at once.
 const DEFMT_RTT_BUFFER_SIZE: &str = "2048";
 
 /// `cargo xtask build`.
-pub(crate) fn command() -> Result<ExitCode> {
-    let elf = build()?;
+pub(crate) fn command(options: &MachineOptions) -> Result<ExitCode> {
+    let elf = Checked::read(options.network.as_deref())?.build()?;
     println!("{}", elf.display());
     Ok(ExitCode::SUCCESS)
 }
@@ -32,22 +37,34 @@ pub(crate) fn cargo_for_target(subcommand: &str) -> Command {
     command
         .arg(subcommand)
         .args(["--locked", "--release", "--target", toolchain::TARGET])
-        .args(["--bin", BINARY, "--features", "defmt"])
+        .args(["--bin", BINARY, "--features", "firmware"])
         .env("DEFMT_LOG", DEFMT_LOG)
         .env("DEFMT_RTT_BUFFER_SIZE", DEFMT_RTT_BUFFER_SIZE)
+        .env_remove(NETWORK_VARIABLE)
         .env_remove("RUSTFLAGS")
         .env_remove("CARGO_ENCODED_RUSTFLAGS")
         .env_remove("CARGO_BUILD_TARGET");
     command
 }
 
-/// Builds the image and says where it is.
+/// Builds the image for the machine of the project and says where it is.
 pub(crate) fn build() -> Result<PathBuf> {
     if let Some(image) = std::env::var_os(IMAGE_VARIABLE) {
         return Ok(PathBuf::from(image));
     }
-    toolchain::ensure_target()?;
+    make(cargo_for_target("build"))
+}
+
+/// Builds the image for the machine that `description`, an absolute path,
+/// describes. The next build takes its place.
+pub(crate) fn build_for(description: &Path) -> Result<PathBuf> {
     let mut command = cargo_for_target("build");
+    command.env(NETWORK_VARIABLE, description);
+    make(command)
+}
+
+fn make(mut command: Command) -> Result<PathBuf> {
+    toolchain::ensure_target()?;
     let output = command
         .arg("--message-format=json-render-diagnostics")
         .stdin(Stdio::null())

@@ -25,12 +25,17 @@ pub(crate) struct ImageSize {
     pub(crate) sections: Vec<Section>,
 }
 
+/// Axes of the sample.
+const SAMPLE_AXES: usize = 6;
+
 /// What an image may need: `firmware-budget.toml`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Budget {
     pub(crate) flash_bytes: u64,
     pub(crate) ram_bytes: u64,
+    /// With twelve axes.
+    pub(crate) ram_bytes_12_axes: u64,
 }
 
 impl ImageSize {
@@ -82,6 +87,18 @@ impl Budget {
         toml::from_str(&text).with_context(|| format!("{}", path.display()))
     }
 
+    /// Whether another machine than the sample needs too much RAM, in words: up to
+    /// six axes what the sample may, up to twelve what twelve may.
+    pub(crate) fn ram_exceeded_by(&self, size: &ImageSize, axes: usize) -> Option<String> {
+        let (used, budget) = match axes {
+            0..=SAMPLE_AXES => (size.ram_bytes, self.ram_bytes),
+            _ => (size.ram_bytes, self.ram_bytes_12_axes),
+        };
+        (used > budget).then(|| {
+            format!("the image needs {used} bytes of RAM, the budget for {axes} axes is {budget}")
+        })
+    }
+
     /// What is above the budget, in words; empty if nothing is.
     pub(crate) fn exceeded_by(&self, size: &ImageSize) -> Vec<String> {
         [
@@ -117,6 +134,7 @@ mod tests {
         let budget = Budget {
             flash_bytes: 100,
             ram_bytes: 10,
+            ram_bytes_12_axes: 20,
         };
         assert!(budget.exceeded_by(&image(100, 10)).is_empty());
         assert_eq!(
@@ -124,12 +142,22 @@ mod tests {
             ["the image needs 101 bytes of flash, 1 more than the budget of 100"]
         );
         assert_eq!(budget.exceeded_by(&image(101, 12)).len(), 2);
+        for (ram, axes, over) in [
+            (10, 6, false),
+            (11, 6, true),
+            (20, 12, false),
+            (21, 7, true),
+        ] {
+            let exceeded = budget.ram_exceeded_by(&image(1000, ram), axes);
+            assert_eq!(exceeded.is_some(), over, "{ram} {axes}");
+        }
     }
 
     #[test]
     fn the_projects_budget_can_be_read() {
         let budget = Budget::read().unwrap();
         assert!(budget.flash_bytes <= 64 * 1024 && budget.ram_bytes <= 16 * 1024);
+        assert!(budget.ram_bytes_12_axes <= 24 * 1024);
     }
 
     #[test]

@@ -15,6 +15,8 @@ mod firmware;
 mod image;
 mod interop;
 mod library;
+mod machine;
+mod networks;
 mod new;
 mod report;
 mod run;
@@ -31,9 +33,9 @@ fn main() -> ExitCode {
     let outcome = match cli.command {
         Command::Run(options) => run::command(&options),
         Command::Test(options) => ci::test(&options),
-        Command::Build => firmware::command(),
+        Command::Build(options) => firmware::command(&options),
         Command::Size(options) => size::command(&options),
-        Command::Flash => attach::flash(),
+        Command::Flash(options) => attach::flash(&options),
         Command::Attach => attach::attach(),
         Command::Check(options) => check::command(&options),
         Command::New(options) => new::command(&options),

@@ -1,6 +1,7 @@
 //! `cargo xtask new`: a machine of the user's own, from the sample.
 
 use std::fs;
+use std::path::Path;
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
@@ -18,7 +19,6 @@ const FILES: [&str; 3] = [
 
 /// `cargo xtask new`.
 pub(crate) fn command(options: &NewOptions) -> Result<ExitCode> {
-    let workspace = cargo::workspace();
     let description = options.dir.join(DESCRIPTION);
     if description.exists() {
         bail!(
@@ -26,13 +26,7 @@ pub(crate) fn command(options: &NewOptions) -> Result<ExitCode> {
             description.display()
         );
     }
-    for file in FILES {
-        let to = options.dir.join(file);
-        if let Some(folder) = to.parent() {
-            fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-        }
-        fs::copy(workspace.join(file), &to).with_context(|| to.display().to_string())?;
-    }
+    copy(&options.dir)?;
     println!(
         "{} is a machine like the sample. Change it, and let it be checked with\n\n    \
          cargo xtask check {}",
@@ -40,4 +34,17 @@ pub(crate) fn command(options: &NewOptions) -> Result<ExitCode> {
         description.display()
     );
     Ok(ExitCode::SUCCESS)
+}
+
+/// Copies the sample into a folder.
+pub(crate) fn copy(dir: &Path) -> Result<()> {
+    let workspace = cargo::workspace();
+    for file in FILES {
+        let to = dir.join(file);
+        if let Some(folder) = to.parent() {
+            fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+        }
+        fs::copy(workspace.join(file), &to).with_context(|| to.display().to_string())?;
+    }
+    Ok(())
 }

@@ -7,7 +7,8 @@ use serde::Serialize;
 
 use crate::cli::SizeOptions;
 use crate::image::{Budget, ImageSize};
-use crate::{firmware, table};
+use crate::machine::Checked;
+use crate::table;
 
 #[derive(Serialize)]
 struct Report<'a> {
@@ -18,7 +19,7 @@ struct Report<'a> {
 }
 
 pub(crate) fn command(options: &SizeOptions) -> Result<ExitCode> {
-    let size = ImageSize::read(&firmware::build()?)?;
+    let size = ImageSize::read(&Checked::read(options.machine.network.as_deref())?.build()?)?;
     let budget = Budget::read()?;
     let exceeded = budget.exceeded_by(&size);
     if options.json {

@@ -1,4 +1,4 @@
-//! FDCAN1 at 1 Mbit/s: the fdcan crate configures it, the way of each frame is
+//! FDCAN1: the fdcan crate configures it, the way of each frame is
 //! here.
 //!
 //! Not through that crate's own transmit and receive calls: they turn a frame
@@ -9,6 +9,7 @@ mod element;
 mod setup;
 
 pub use element::{Element, RxElement};
+pub use setup::BitTiming;
 pub(crate) use setup::setup;
 
 use crate::message_ram::{self, DEPTH};

@@ -42,6 +42,8 @@ pub struct Config {
     /// After how long without [`watchdog::Watchdog::feed`] the board resets,
     /// in milliseconds, 1..=500.
     pub watchdog_ms: u32,
+    /// How the CAN controller makes a bit.
+    pub bit_timing: can::BitTiming,
     /// What the CAN controller receives: at most
     /// [`can::FILTERS`] ranges, the index of the first that matches comes with
     /// each frame.
@@ -105,6 +107,7 @@ pub fn setup(peripherals: pac::Peripherals, config: &Config) -> Devices {
         pins.can_tx,
         pins.can_rx,
         &mut rcc,
+        config.bit_timing,
         config.filters,
     );
     let timers = timers::setup(

@@ -4,12 +4,14 @@ mod bits;
 mod capacity;
 mod configuration;
 mod error_control;
+mod firmware;
 mod identifiers;
 
 pub(crate) use bits::{bit_rates, peripherals};
 pub(crate) use capacity::capacity;
 pub(crate) use configuration::configuration;
 pub(crate) use error_control::error_control;
+pub(crate) use firmware::firmware;
 pub(crate) use identifiers::identifiers;
 
 use crate::description::{Description, Device, Node};

@@ -5,6 +5,8 @@ use std::fmt::Write;
 use crate::model::{Identity, Machine, Node, Pdo};
 use crate::object::Address;
 
+const MS_US: u32 = 1000;
+
 /// The description of the first bus as constants of the library that `library`
 /// names: `crate` within it, `canmaster` outside.
 ///
@@ -24,6 +26,7 @@ fn write(machine: &Machine, library: &str, out: &mut String) -> std::fmt::Result
     let master = &machine.master;
     writeln!(out, "// Made from network.toml; changes here are lost.\n")?;
     writeln!(out, "use {library}::id::NodeId;")?;
+    writeln!(out, "use {library}::motion::experiment::Motor;")?;
     writeln!(
         out,
         "use {library}::network::{{Identity, Master, Network, Node}};"
@@ -37,7 +40,7 @@ fn write(machine: &Machine, library: &str, out: &mut String) -> std::fmt::Result
     )?;
     writeln!(
         out,
-        "pub const TPDO_DEADLINE_US: u32 = {};",
+        "pub const TPDO_DEADLINE_US: u16 = {};",
         bus.tpdo_deadline_us
     )?;
     writeln!(
@@ -53,8 +56,17 @@ fn write(machine: &Machine, library: &str, out: &mut String) -> std::fmt::Result
         out,
         "/// The shortest SYNC period (1006h) that the cycle's frames fit into, us."
     )?;
-    let shortest = bus.layout.demand.smallest_cycle().unwrap_or(bus.cycle_us);
+    let whole = bus.tpdo_deadline_us + bus.layout.after_tpdos_us();
+    let smallest = bus.layout.demand.smallest_cycle().unwrap_or(bus.cycle_us);
+    let shortest = smallest.max(whole);
     writeln!(out, "pub const SHORTEST_CYCLE_US: u32 = {shortest};")?;
+    writeln!(
+        out,
+        "/// From the first RPDO of a cycle to the end of the last, in whole milliseconds, us."
+    )?;
+    let rpdos = bus.layout.after_tpdos_us() - bus.layout.demand.compute_us;
+    let rpdos = rpdos.next_multiple_of(MS_US);
+    writeln!(out, "pub const RPDOS_US: u16 = {rpdos};")?;
     writeln!(
         out,
         "/// Prescaler, segment 1 and segment 2 of the bit timing."
@@ -65,6 +77,7 @@ fn write(machine: &Machine, library: &str, out: &mut String) -> std::fmt::Result
         "pub const BIT_TIMING: (u16, u16, u16) = ({}, {}, {});\n",
         t.prescaler, t.seg1, t.seg2
     )?;
+    motors(machine, out)?;
     writeln!(out, "/// The bus \"{}\".", bus.name.escape_default())?;
     writeln!(out, "pub static NETWORK: Network = Network {{")?;
     writeln!(out, "    bit_rate: {},", bus.bit_rate)?;
@@ -93,6 +106,25 @@ fn write(machine: &Machine, library: &str, out: &mut String) -> std::fmt::Result
         node(described, library, out)?;
     }
     writeln!(out, "    ],\n}};")
+}
+
+fn motors(machine: &Machine, out: &mut String) -> std::fmt::Result {
+    writeln!(out, "/// The motors, in the order of the axes.")?;
+    writeln!(out, "pub const MOTORS: [Motor; AXES] = [")?;
+    for motor in machine.nodes.iter().filter_map(Node::motor) {
+        let (motor_turns, load_turns) = motor.gear;
+        writeln!(out, "    Motor {{")?;
+        writeln!(
+            out,
+            "        increments_per_turn: {},",
+            motor.increments_per_turn
+        )?;
+        writeln!(out, "        gear: ({motor_turns}, {load_turns}),")?;
+        writeln!(out, "        max_speed: {},", motor.max_speed)?;
+        writeln!(out, "        max_acceleration: {},", motor.max_acceleration)?;
+        writeln!(out, "        max_travel: {},\n    }},", motor.max_travel)?;
+    }
+    writeln!(out, "];\n")
 }
 
 fn node(node: &Node, library: &str, out: &mut String) -> std::fmt::Result {

@@ -38,6 +38,7 @@ pub(crate) fn machine(
     description: &Description,
     source: &Source,
     open: &mut Open<'_>,
+    for_firmware: bool,
     problems: &mut Problems,
 ) -> Option<Machine> {
     let mut context = Context { source, problems };
@@ -84,6 +85,9 @@ pub(crate) fn machine(
     check::bit_rates(description, &files, &buses, &nodes, &mut context);
     check::configuration(description, &files, &master, &nodes, &mut context);
     let buses = check::capacity(description, buses, &master, &nodes, &mut context);
+    if for_firmware && !context.problems.has_errors() {
+        check::firmware(description, &nodes, &mut context);
+    }
     Some(Machine {
         master,
         buses,

@@ -1,19 +1,68 @@
 // Made from network.toml; changes here are lost.
 
 use canmaster::id::NodeId;
+use canmaster::motion::experiment::Motor;
 use canmaster::network::{Identity, Master, Network, Node};
 use canmaster::time::Duration;
 
 /// Axes of the group.
 pub const AXES: usize = 6;
 /// When the PDO producer goes ahead without the TPDOs that are missing, us.
-pub const TPDO_DEADLINE_US: u32 = 5000;
+pub const TPDO_DEADLINE_US: u16 = 5000;
 /// Cycles in a row without a TPDO after which its node counts as lost.
 pub const TPDO_MISSING_LIMIT: u8 = 3;
 /// The shortest SYNC period (1006h) that the cycle's frames fit into, us.
-pub const SHORTEST_CYCLE_US: u32 = 5000;
+pub const SHORTEST_CYCLE_US: u32 = 6835;
+/// From the first RPDO of a cycle to the end of the last, in whole milliseconds, us.
+pub const RPDOS_US: u16 = 2000;
 /// Prescaler, segment 1 and segment 2 of the bit timing.
 pub const BIT_TIMING: (u16, u16, u16) = (1, 20, 3);
+
+/// The motors, in the order of the axes.
+pub const MOTORS: [Motor; AXES] = [
+    Motor {
+        increments_per_turn: 2000,
+        gear: (1, 1),
+        max_speed: 3000,
+        max_acceleration: 20000,
+        max_travel: 2147483647,
+    },
+    Motor {
+        increments_per_turn: 2000,
+        gear: (1, 1),
+        max_speed: 3000,
+        max_acceleration: 20000,
+        max_travel: 2147483647,
+    },
+    Motor {
+        increments_per_turn: 2000,
+        gear: (1, 1),
+        max_speed: 3000,
+        max_acceleration: 20000,
+        max_travel: 2147483647,
+    },
+    Motor {
+        increments_per_turn: 2000,
+        gear: (1, 1),
+        max_speed: 3000,
+        max_acceleration: 20000,
+        max_travel: 2147483647,
+    },
+    Motor {
+        increments_per_turn: 2000,
+        gear: (1, 1),
+        max_speed: 3000,
+        max_acceleration: 20000,
+        max_travel: 2147483647,
+    },
+    Motor {
+        increments_per_turn: 2000,
+        gear: (1, 1),
+        max_speed: 3000,
+        max_acceleration: 20000,
+        max_travel: 2147483647,
+    },
+];
 
 /// The bus "main".
 pub static NETWORK: Network = Network {

@@ -7,9 +7,19 @@ use canmaster::NodeId;
 use super::arrivals::{Arrival, Assignment, Release, worst_pair};
 use super::axis::{AxisMonitor, STANDSTILL_RPM};
 use super::bus::BusFigures;
+use crate::time::Time;
 
-/// How far from its target an axis may come to rest, increments.
+/// How far from its target an axis may come to rest, increments, at a cycle of
+/// 10 ms or less.
 pub const ARRIVAL_TOLERANCE: i64 = 5;
+
+/// The same at any cycle: what the position loop cannot see in time grows with the
+/// cycle.
+pub fn arrival_tolerance(cycle: Time) -> i64 {
+    const LONGEST_US: u64 = 10_000;
+    let us = cycle.as_us().max(LONGEST_US);
+    ARRIVAL_TOLERANCE * us as i64 / LONGEST_US as i64
+}
 
 /// How long interrupts may be off at a time, cycles: SYNC must not wait.
 pub const IRQ_OFF_LIMIT: u64 = 120;
@@ -142,9 +152,10 @@ fn beside_target(evidence: &Evidence<'_>) -> Option<String> {
         .arrivals
         .iter()
         .max_by_key(|arrival| arrival.error)?;
-    (worst.error > ARRIVAL_TOLERANCE).then(|| {
+    let allowed = arrival_tolerance(evidence.assignment.cycle);
+    (worst.error > allowed).then(|| {
         format!(
-            "node {}: stopped {} increments beside its target {} (allowed: {ARRIVAL_TOLERANCE})",
+            "node {}: stopped {} increments beside its target {} (allowed: {allowed})",
             worst.node.get(),
             worst.error,
             worst.target
@@ -193,7 +204,6 @@ mod tests {
     use super::*;
     use crate::judge::arrivals::Part;
     use crate::judge::axis::TracePoint;
-    use crate::time::Time;
 
     struct Case {
         axes: Vec<AxisMonitor>,
@@ -328,6 +338,13 @@ mod tests {
             &case,
             "node 2: moved at -50.0 rpm without a release at 1.000000 s",
         );
+    }
+
+    #[test]
+    fn a_longer_cycle_has_a_larger_tolerance() {
+        for (ms, allowed) in [(1, 5), (10, 5), (20, 10), (60, 30)] {
+            assert_eq!(arrival_tolerance(Time::from_ms(ms)), allowed);
+        }
     }
 
     #[test]

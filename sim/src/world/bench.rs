@@ -3,7 +3,7 @@
 use canmaster::NodeId;
 
 use super::stimulus::Stimulus;
-use super::{World, network, watch};
+use super::{Machine, World, watch};
 use crate::board::Board;
 use crate::bus::{PortId, WireRecord};
 use crate::drive::{Drive, DriveFault, DriveStatus, PlantState};
@@ -63,12 +63,19 @@ impl World<'_> {
     }
 
     fn fault(&mut self, node: NodeId, fault: DriveFault) {
-        let station = network()
+        let station = self
+            .machine
+            .network()
             .find(node)
             .and_then(|(axis, _)| self.stations[axis].as_mut());
         if let Some(station) = station {
             station.drive.inject(fault);
         }
+    }
+
+    /// The machine that the firmware is built for.
+    pub fn machine(&self) -> &Machine {
+        self.machine
     }
 
     /// The present moment.
@@ -152,7 +159,7 @@ impl World<'_> {
 
     /// Where a drive is on the bus, if it is there.
     pub fn drive_port(&self, node: NodeId) -> Option<PortId> {
-        let (axis, _) = network().find(node)?;
+        let (axis, _) = self.machine.network().find(node)?;
         Some(self.stations[axis].as_ref()?.port)
     }
 

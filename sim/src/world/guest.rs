@@ -40,7 +40,7 @@ impl World<'_> {
         let name = "guest".to_string();
         let port = self.bus.attach(&name);
         let mut controller = Controller::default();
-        controller.start(super::network().bit_rate);
+        controller.start(self.machine.network().bit_rate);
         self.ports.push(name);
         self.guest = Some(Guest {
             port,

@@ -2,12 +2,14 @@
 
 use std::path::Path;
 
+use super::machine::{self, Machine};
 use crate::log::{LogError, LogTable};
 
-/// An ELF file with the strings of its log.
+/// An ELF file with the strings of its log, and the machine that it is built for.
 pub struct Image {
     elf: Vec<u8>,
     table: LogTable,
+    machine: Machine,
 }
 
 /// An image cannot be used.
@@ -28,19 +30,34 @@ pub enum ImageError {
 }
 
 impl Image {
-    /// An image from the bytes of its ELF file.
+    /// An image for the sample machine from the bytes of its ELF file.
     pub fn new(elf: Vec<u8>) -> Result<Image, ImageError> {
         let table = LogTable::new(&elf)?;
-        Ok(Image { elf, table })
+        let machine = machine::sample().clone();
+        Ok(Image {
+            elf,
+            table,
+            machine,
+        })
     }
 
-    /// An image from its ELF file.
+    /// An image for the sample machine from its ELF file.
     pub fn read(path: &Path) -> Result<Image, ImageError> {
         let elf = std::fs::read(path).map_err(|source| ImageError::Read {
             path: path.display().to_string(),
             source,
         })?;
         Image::new(elf)
+    }
+
+    /// The same, built for another machine.
+    pub fn built_for(self, machine: Machine) -> Image {
+        Image { machine, ..self }
+    }
+
+    /// The machine that it is built for.
+    pub fn machine(&self) -> &Machine {
+        &self.machine
     }
 
     /// The ELF file.

@@ -5,8 +5,8 @@ mod bench;
 mod client;
 mod guest;
 mod image;
+mod machine;
 mod operator;
-mod program;
 mod record;
 mod scenario;
 mod station;
@@ -18,7 +18,7 @@ mod watch;
 
 pub use client::Client;
 pub use image::{Image, ImageError};
-pub use program::{assignment, network, round_trip, traffic};
+pub use machine::{Machine, MachineError, sample};
 pub use record::{AxisRecord, Record};
 pub use scenario::{Ailment, Scenario};
 pub use stimulus::Stimulus;
@@ -70,6 +70,7 @@ impl Observer for () {
 /// The machine.
 pub struct World<'i> {
     scenario: Scenario,
+    machine: &'i Machine,
     assignment: Assignment,
     now: Time,
     next_look: Time,
@@ -105,6 +106,8 @@ impl<'i> World<'i> {
         let mut ports = vec!["board".to_string()];
         let board_port = bus.attach(&ports[0]);
         let board = Board::new(image.elf(), board_options(&scenario))?;
+        let machine = image.machine();
+        let bit_rate = machine.network().bit_rate;
         let mut connect = |config: DriveConfig| {
             let name = format!("node {}", config.node.get());
             let port = bus.attach(&name);
@@ -112,11 +115,13 @@ impl<'i> World<'i> {
             Station::new(config, port)
         };
         let mut stations = Vec::new();
-        for config in station::machine(&scenario) {
+        for config in station::machine(machine, &scenario) {
             stations.push(config.map(&mut connect));
         }
-        let strangers = scenario.strangers.iter().cloned().map(connect).collect();
-        let assignment = assignment();
+        let strangers = scenario.strangers.iter().cloned();
+        let strangers = strangers.map(|config| connect(DriveConfig { bit_rate, ..config }));
+        let strangers = strangers.collect();
+        let assignment = machine.assignment();
         let moves = (0..stations.len())
             .map(|axis| assignment.of_axis(axis).count())
             .collect();
@@ -132,6 +137,7 @@ impl<'i> World<'i> {
         Ok(World {
             in_motion: scenario.in_motion.clone(),
             scenario,
+            machine,
             assignment,
             now: Time::ZERO,
             next_look: Time::ZERO,
@@ -199,7 +205,9 @@ impl<'i> World<'i> {
         self.wire.extend(self.bus.take_records());
         let unfinished = self.unfinished();
         let complaints = self.complaints();
-        let axes = network()
+        let axes = self
+            .machine
+            .network()
             .nodes
             .iter()
             .zip(self.stations.iter().zip(self.watch.axes))
@@ -212,6 +220,7 @@ impl<'i> World<'i> {
         Seen {
             seed: self.scenario.seed,
             simulated: self.now,
+            machine: self.machine.clone(),
             ports: self.ports,
             wire: self.wire,
             log: self.log,
@@ -222,7 +231,7 @@ impl<'i> World<'i> {
             complaints,
             unfinished,
         }
-        .judge(&self.assignment, &traffic())
+        .judge(&self.assignment, &self.machine.traffic())
     }
 
     /// What the board has noticed: crashes, resets that nobody ordered, wrong
@@ -257,7 +266,7 @@ impl<'i> World<'i> {
             (Some(enabled), true) => format!(
                 "no whole round trip fits: all drives were enabled at {enabled} s, a round trip \
                  takes {} s, and the run ended at {simulated} s; give it more with --seconds",
-                round_trip().unwrap_or(Time::ZERO)
+                self.machine.round_trip().unwrap_or(Time::ZERO)
             ),
             (Some(_), false) => format!("a round trip was still going on at {simulated} s"),
         }

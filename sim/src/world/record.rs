@@ -2,6 +2,7 @@
 
 use canmaster::NodeId;
 
+use super::Machine;
 use super::watch::Startup;
 use crate::board::BoardStats;
 use crate::bus::WireRecord;
@@ -28,6 +29,7 @@ pub struct AxisRecord {
 pub(super) struct Seen {
     pub(super) seed: u64,
     pub(super) simulated: Time,
+    pub(super) machine: Machine,
     pub(super) ports: Vec<String>,
     pub(super) wire: Vec<WireRecord>,
     pub(super) log: Vec<(Time, LogLine)>,
@@ -46,6 +48,8 @@ pub struct Record {
     pub seed: u64,
     /// Virtual time from power-on to the end.
     pub simulated: Time,
+    /// The machine that moved.
+    pub machine: Machine,
     /// Names of the bus's ports, by number.
     pub ports: Vec<String>,
     /// Everything that was on the wire.
@@ -96,6 +100,7 @@ impl Seen {
             lss: lss::judge(&self.wire),
             seed: self.seed,
             simulated: self.simulated,
+            machine: self.machine,
             ports: self.ports,
             wire: self.wire,
             log: self.log,

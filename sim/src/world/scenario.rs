@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use canmaster::NodeId;
 use canmaster::sdo::AbortCode;
 
+use super::station;
 use super::stimulus::Stimulus;
-use super::{network, station};
 use crate::board::{BankContents, FlashOptions};
 use crate::drive::{DriveConfig, DriveFault, Identity};
 use crate::time::Time;
@@ -152,7 +152,7 @@ impl Scenario {
 
     /// The same with none of the drives.
     pub fn without_drives(mut self) -> Scenario {
-        self.without = network().nodes.iter().map(|node| node.id).collect();
+        self.without = (1..=NodeId::MAX.get()).filter_map(NodeId::new).collect();
         self
     }
 

@@ -1,10 +1,12 @@
 //! The drives on the bus, each with its place there.
 
 use canmaster::NodeId;
+use canmaster::motion::experiment::Motor;
+use canmaster::network::Node;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-use super::{Scenario, network};
+use super::{Machine, Scenario};
 use crate::bus::{BitTiming, Bus, PortId};
 use crate::drive::{Drive, DriveConfig};
 use crate::time::Time;
@@ -14,6 +16,9 @@ use crate::time::Time;
 const FACTORY_STREAM: u64 = 0xFAC7_0000;
 /// The last of them is switched on by then.
 const SWITCHED_ON_US: u64 = 800_000;
+
+/// Its serial number follows from this; node-IDs are given from below.
+const STRANGER: NodeId = NodeId::constant::<126>();
 
 /// A drive with its place on the bus.
 pub(super) struct Station {
@@ -46,11 +51,12 @@ impl Station {
 }
 
 /// The drives of the network, in its order; `None`: not on the bus.
-pub(super) fn machine(scenario: &Scenario) -> Vec<Option<DriveConfig>> {
+pub(super) fn machine(machine: &Machine, scenario: &Scenario) -> Vec<Option<DriveConfig>> {
     let mut random = Pcg64Mcg::seed_from_u64(scenario.seed ^ FACTORY_STREAM);
-    let mut drive = |node: NodeId| {
-        let faults = scenario.faults.get(&node).into_iter().flatten().copied();
-        let config = (scenario.tuned)(DriveConfig::new(node, scenario.seed));
+    let mut drive = |node: &Node, motor: &Motor| {
+        let faults = scenario.faults.get(&node.id).into_iter().flatten().copied();
+        let described = described(node, motor, machine, scenario.seed);
+        let config = (scenario.tuned)(described);
         let mut config = faults.fold(config, DriveConfig::with);
         if scenario.factory {
             config.unconfigured = true;
@@ -58,18 +64,34 @@ pub(super) fn machine(scenario: &Scenario) -> Vec<Option<DriveConfig>> {
         }
         config
     };
-    let nodes = network().nodes.iter().map(|node| node.id);
+    let nodes = machine.network().nodes.iter().zip(machine.motors());
     nodes
-        .map(|node| (!scenario.without.contains(&node)).then(|| drive(node)))
+        .map(|(node, motor)| (!scenario.without.contains(&node.id)).then(|| drive(node, motor)))
         .collect()
 }
 
-/// A drive without node-ID that the network does not name.
+/// The drive as the network describes it: bit rate, identity, encoder.
+fn described(node: &Node, motor: &Motor, machine: &Machine, seed: u64) -> DriveConfig {
+    let mut config = DriveConfig::new(node.id, seed);
+    config.bit_rate = machine.network().bit_rate;
+    config.plant.increments_per_turn = motor.increments_per_turn;
+    let (wanted, own) = (&node.identity, &mut config.identity);
+    for (wanted, own) in [
+        (wanted.device_type, &mut own.device_type),
+        (wanted.vendor, &mut own.vendor),
+        (wanted.product, &mut own.product),
+        (wanted.revision, &mut own.revision),
+        (wanted.serial, &mut own.serial),
+    ] {
+        *own = wanted.unwrap_or(*own);
+    }
+    config
+}
+
+/// A drive without node-ID that no network is likely to name.
 pub(super) fn stranger(seed: u64) -> DriveConfig {
-    let mut others = (1..=NodeId::MAX.get()).filter_map(NodeId::new);
-    let node = others.find(|node| network().find(*node).is_none());
     DriveConfig {
         unconfigured: true,
-        ..DriveConfig::new(node.unwrap_or(NodeId::MAX), seed)
+        ..DriveConfig::new(STRANGER, seed)
     }
 }

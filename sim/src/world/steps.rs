@@ -4,7 +4,7 @@
 use super::operator::View;
 use super::station::Station;
 use super::watch::AxisTruth;
-use super::{Observer, World, enabled, operational, round_trip};
+use super::{Observer, World, enabled, operational};
 use crate::board::Stop;
 use crate::drive::Drive;
 use crate::log::Level;
@@ -161,7 +161,10 @@ impl World<'_> {
         let view = View {
             now: self.now,
             ready: self.watch.ready(),
-            round_trip: self.watch.round_trip().or_else(round_trip),
+            round_trip: self
+                .watch
+                .round_trip()
+                .or_else(|| self.machine.round_trip()),
             end: self.scenario.end,
         };
         let mut presses = Vec::new();

@@ -35,7 +35,8 @@ struct Figures {
 
 pub(super) fn run(image: &Image, seed: u64) -> Result<Outcome> {
     let started = Instant::now();
-    let nodes: Vec<_> = world::network().nodes.iter().map(|node| node.id).collect();
+    let network = image.machine().network();
+    let nodes: Vec<_> = network.nodes.iter().map(|node| node.id).collect();
     let scenario = Scenario::new(seed, LIMIT).unattended().tuned(tune);
     eprintln!("Booting the board and {} drives.", nodes.len());
     let mut world =
@@ -52,7 +53,7 @@ pub(super) fn run(image: &Image, seed: u64) -> Result<Outcome> {
         "[{:6.2} s] all drives are operational",
         world.now().as_secs_f64()
     );
-    let bit_rate = world::network().bit_rate;
+    let bit_rate = network.bit_rate;
     let latency = Time::from_us(LATENCY_US);
     let judged = configuration(world.wire(), &nodes, latency, bit_rate)
         .context("a drive was not configured")?;

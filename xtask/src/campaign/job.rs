@@ -8,6 +8,8 @@ use canmaster_sim::time::Time;
 use canmaster_sim::world::{Image, Record, Scenario, World, trials};
 use serde::Serialize;
 
+use crate::networks::{self, Variant};
+
 /// The interrupts whose tasks are made to hang, in turn.
 const HANGS: [u8; 5] = [
     irqs::FDCAN1_IT0,
@@ -163,6 +165,27 @@ impl Figures {
 }
 
 impl Row {
+    /// Builds a machine of its own, and lets it make a round trip.
+    pub(super) fn of(variant: Variant) -> Row {
+        const SEED: u64 = 1;
+        let started = Instant::now();
+        let mut figures = None;
+        let outcome = variant.build().and_then(|built| {
+            let started = Instant::now();
+            let record = variant.run(&built.image, SEED)?;
+            figures = Some(Figures::of(&record, started.elapsed().as_secs_f64()));
+            networks::good(&record)
+        });
+        Row {
+            seed: SEED,
+            kind: variant.name(),
+            ok: outcome.is_ok(),
+            reason: outcome.err().map(|e| format!("{e:#}")).unwrap_or_default(),
+            wall_s: started.elapsed().as_secs_f64(),
+            figures,
+        }
+    }
+
     /// What stands over the columns of [`cells`](Self::cells).
     pub(super) const HEADING: [&str; 10] = [
         "seed",

@@ -13,6 +13,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
 use crate::cli::CampaignOptions;
+use crate::networks::{self, Variant};
 use crate::{firmware, table};
 use job::{Job, Row};
 
@@ -48,6 +49,10 @@ pub(crate) fn command(options: &CampaignOptions) -> Result<ExitCode> {
         },
     );
     bar.finish_and_clear();
+    let runs: Vec<Row> = runs
+        .into_iter()
+        .chain(networks::all().map(network))
+        .collect();
     let wall_s = started.elapsed().as_secs_f64();
     let ok = runs.iter().filter(|row| row.ok).count();
     let all_ok = ok == runs.len();
@@ -73,6 +78,16 @@ pub(crate) fn command(options: &CampaignOptions) -> Result<ExitCode> {
     } else {
         ExitCode::FAILURE
     })
+}
+
+/// Builds and runs another machine than the sample.
+fn network(variant: Variant) -> Row {
+    eprintln!("{}", variant.name());
+    let row = Row::of(variant);
+    if !row.ok {
+        eprintln!("{}: {}", row.kind, row.reason);
+    }
+    row
 }
 
 fn progress(jobs: usize) -> ProgressBar {

@@ -3,8 +3,9 @@
 
 use anyhow::{Context, Result, bail, ensure};
 use canmaster::id::{Address, FunctionCode, NodeId};
-use canmaster::master::{rpdo1, rpdo2};
+use canmaster::master::AxisPdos;
 use canmaster::motion::AxisCommand;
+use canmaster::network::sample::SIX_EPOS4;
 use canmaster::network::{self, Identity, Master, Network, Node, Pdo};
 use canmaster::nmt::{Command, NodeControl, Target};
 use canmaster::pdo::{MappingEntry, Transmission};
@@ -270,12 +271,20 @@ fn round_of(bench: &mut Bench, ids: &[NodeId], nodes: u32) -> Result<Round> {
     // The same payloads in every round.
     let mut random = Random(SEED);
     let mut commands = Vec::new();
+    // The nodes are mapped like those of the sample.
+    let mut nodes_of_sample = SIX_EPOS4.nodes.iter();
+    let pdos = nodes_of_sample.find_map(AxisPdos::of);
+    let pdos = pdos.context("the sample maps no velocity")?;
     bench.take_records();
     for n in 0..nodes as usize {
         let id = ids[n % ids.len()];
         let command = random.command();
-        bench.send(rpdo1(id, &command));
-        bench.send(rpdo2(id, &command));
+        for frame in [0, 1]
+            .into_iter()
+            .filter_map(|n| pdos.rpdo(n, id, &command))
+        {
+            bench.send(frame);
+        }
         commands.retain(|(other, _)| *other != id);
         commands.push((id, command));
     }

@@ -88,7 +88,7 @@ pub(crate) fn picture(record: &Record) -> Result<String> {
 }
 
 fn curves(record: &Record) -> Vec<Curve<'_>> {
-    let assignment = canmaster_sim::world::assignment();
+    let assignment = record.machine.assignment();
     let mut sets: Vec<u8> = Vec::new();
     let of_axis = |(axis, of_axis): (usize, &'_ canmaster_sim::world::AxisRecord)| {
         let set = assignment

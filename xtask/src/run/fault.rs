@@ -2,7 +2,8 @@
 
 use std::str::FromStr;
 
-use canmaster::{NodeId, network};
+use canmaster::NodeId;
+use canmaster::network::{self, Network, Node};
 use canmaster_sim::world::{Ailment, Scenario};
 
 /// `NODE:identity`, `NODE:refuse=INDEX[:SUB]`, `NODE:forgetful`, `NODE:silent`.
@@ -13,6 +14,22 @@ pub(crate) struct Fault {
 }
 
 impl Fault {
+    /// Whether a drive of the network can have it; if not, why.
+    pub(crate) fn check(self, network: &'static Network) -> Result<(), String> {
+        let id = self.node.get();
+        let Some((_, node)) = network.find(self.node) else {
+            return Err(format!("the network has no node {id}"));
+        };
+        if let Ailment::RefusesWrite { index, sub } = self.ailment
+            && !is_written(network, node, index, sub)
+        {
+            return Err(format!(
+                "the configuration of node {id} does not write {index:04X}h:{sub:02X}, so it cannot be refused"
+            ));
+        }
+        Ok(())
+    }
+
     /// The scenario with this fault.
     pub(crate) fn apply(self, scenario: Scenario) -> Scenario {
         scenario.ailing(self.node, self.ailment)
@@ -36,11 +53,6 @@ impl FromStr for Fault {
                 let (index, sub) = object.split_once(':').unwrap_or((object, "0"));
                 let index = u16::from_str_radix(index, 16).map_err(|_| HELP)?;
                 let sub = u8::from_str_radix(sub, 16).map_err(|_| HELP)?;
-                if !is_written(node, index, sub) {
-                    return Err(format!(
-                        "the configuration does not write {index:04X}h:{sub:02X}, so it cannot be refused"
-                    ));
-                }
                 Ailment::RefusesWrite { index, sub }
             }
             _ => return Err(HELP.into()),
@@ -49,15 +61,9 @@ impl FromStr for Fault {
     }
 }
 
-/// Whether the master's configuration of `node` writes this object.
-fn is_written(node: NodeId, index: u16, sub: u8) -> bool {
-    let network = canmaster_sim::world::network();
-    network
-        .nodes
-        .iter()
-        .filter(|known| known.id == node)
-        .flat_map(|known| network::plan(network, known))
-        .any(|write| (write.at.index.0, write.at.sub.0) == (index, sub))
+/// Whether the master's configuration of a node writes this object.
+fn is_written(network: &'static Network, node: &'static Node, index: u16, sub: u8) -> bool {
+    network::plan(network, node).any(|write| (write.at.index.0, write.at.sub.0) == (index, sub))
 }
 
 #[cfg(test)]
@@ -78,16 +84,18 @@ mod tests {
         for bad in [
             "",
             "3",
-            "9:silent",
             "3:loud",
             "3:refuse",
             "3:refuse=xyz",
             "3:refuse=10000",
-            "3:refuse=1000",
-            "3:refuse=60C2",
             "identity",
         ] {
             assert!(read(bad).is_err(), "{bad}");
+        }
+        for unfit in ["9:silent", "3:refuse=1000", "3:refuse=60C2"] {
+            let network = canmaster_sim::world::sample().network();
+            assert!(read(unfit).unwrap().check(network).is_err(), "{unfit}");
+            assert_eq!(read("3:refuse=6085").unwrap().check(network), Ok(()));
         }
     }
 }

@@ -10,14 +10,16 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
+use canmaster::network::{self, Network};
 use canmaster_sim::bridge::Bridge;
 use canmaster_sim::judge::Outcome;
 use canmaster_sim::time::Time;
-use canmaster_sim::world::{self, Image, Scenario, World};
+use canmaster_sim::world::{Machine, Scenario, World};
 
 use crate::cli::{self, RunOptions};
 use crate::image::ImageSize;
-use crate::{firmware, report};
+use crate::machine::Checked;
+use crate::report;
 use progress::Progress;
 use summary::Summary;
 
@@ -31,17 +33,19 @@ const FACTORY: Time = Time::from_ms(4500);
 const MARGIN: Time = Time::from_ms(1000);
 
 pub(crate) fn command(options: &RunOptions) -> Result<ExitCode> {
+    let checked = Checked::read(options.machine.network.as_deref())?;
+    known(options, checked.machine.network());
     eprintln!("Building the firmware.");
-    let elf = firmware::build()?;
+    let elf = checked.build()?;
     let size = ImageSize::read(&elf)?;
-    let image = Image::read(&elf).context("the firmware image cannot be run")?;
+    let image = checked.image(&elf)?;
     let started = Instant::now();
-    let scenario = scenario(options);
-    let mut progress = Progress::new(options, scenario.end);
+    let scenario = scenario(options, &checked.machine);
+    let mut progress = Progress::new(options, &checked.machine, scenario.end);
     let mut world =
         World::new(&image, scenario).context("the emulated board cannot boot this image")?;
     if let Some(port) = options.bridge {
-        world = world.with_bridge(bridge(port)?);
+        world = world.with_bridge(bridge(port, checked.machine.network())?);
         progress.stop_on(ctrl_c::handle()?);
     }
     let record = world.run(&mut progress);
@@ -71,12 +75,38 @@ pub(crate) fn command(options: &RunOptions) -> Result<ExitCode> {
     }
 }
 
-fn scenario(options: &RunOptions) -> Scenario {
+/// Nodes that the network does not name end the program, and faults that they
+/// cannot have.
+fn known(options: &RunOptions, network: &'static Network) {
+    let ids = || {
+        let ids: Vec<String> = network
+            .nodes
+            .iter()
+            .map(|n| n.id.get().to_string())
+            .collect();
+        ids.join(", ")
+    };
+    for &node in &options.without {
+        if network.find(node).is_none() {
+            let (node, ids) = (node.get(), ids());
+            cli::refuse(&format!(
+                "--without {node}: the network has the nodes {ids}"
+            ));
+        }
+    }
+    for fault in &options.fault {
+        if let Err(words) = fault.check(network) {
+            cli::refuse(&format!("--fault: {words}"));
+        }
+    }
+}
+
+fn scenario(options: &RunOptions, machine: &Machine) -> Scenario {
     let end = match options.seconds {
         Some(seconds) => Time::from_secs_f64(seconds),
         None if options.bridge.is_some() => Time::from_secs_f64(cli::LONGEST_RUN_S),
-        None if options.factory => default_end() + FACTORY,
-        None => default_end(),
+        None if options.factory => default_end(machine) + FACTORY,
+        None => default_end(machine),
     };
     let mut sound = Scenario::new(options.seed, end);
     sound.factory = options.factory;
@@ -94,8 +124,8 @@ fn scenario(options: &RunOptions) -> Scenario {
 }
 
 /// A bridge, and how to use it.
-fn bridge(port: u16) -> Result<Bridge> {
-    let bridge = Bridge::listen(port, world::network().bit_rate).with_context(|| {
+fn bridge(port: u16, network: &Network) -> Result<Bridge> {
+    let bridge = Bridge::listen(port, network.bit_rate).with_context(|| {
         format!("cannot listen on port {port} of this computer; --bridge 0 takes one that is free")
     })?;
     eprintln!(
@@ -105,7 +135,20 @@ fn bridge(port: u16) -> Result<Bridge> {
     Ok(bridge)
 }
 
-/// Enough for one round trip.
-fn default_end() -> Time {
-    START + world::round_trip().unwrap_or(Time::ZERO) + MARGIN
+/// Enough for one round trip: what the sample needs, and what a slower bus takes
+/// longer to configure its drives and to enable them.
+pub(crate) fn default_end(machine: &Machine) -> Time {
+    let network = machine.network();
+    let writes = |node| network::plan(network, node).count() as u64;
+    let transfers: u64 = network.nodes.iter().map(writes).sum();
+    let configuring =
+        Time::from_us(transfers * TRANSFER_BITS * US_PER_S / u64::from(network.bit_rate));
+    let enabling = Time::from_us(ENABLING_CYCLES * u64::from(network.cycle.as_micros()));
+    START + configuring + enabling + machine.round_trip().unwrap_or(Time::ZERO) + MARGIN
 }
+
+/// A request and its answer, with room for retries.
+const TRANSFER_BITS: u64 = 400;
+/// Until all drives are enabled.
+const ENABLING_CYCLES: u64 = 50;
+const US_PER_S: u64 = 1_000_000;

@@ -13,7 +13,7 @@ use canmaster_sim::drive::DriveStatus;
 use canmaster_sim::frame::WireId;
 use canmaster_sim::log::LogLine;
 use canmaster_sim::time::Time;
-use canmaster_sim::world::{self, Observer, World};
+use canmaster_sim::world::{self, Machine, Observer, World};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::cli::{LogLevel, RunOptions};
@@ -46,7 +46,7 @@ pub(super) struct Progress {
 }
 
 impl Progress {
-    pub(super) fn new(options: &RunOptions, end: Time) -> Progress {
+    pub(super) fn new(options: &RunOptions, machine: &Machine, end: Time) -> Progress {
         let target = ProgressDrawTarget::stderr_with_hz(DRAW_HZ);
         let bar = ProgressBar::with_draw_target(Some(end.as_ms()), target);
         let style = ProgressStyle::with_template("{bar:24} {prefix} {wide_msg}")
@@ -61,7 +61,7 @@ impl Progress {
             stop: Arc::default(),
             next: Time::ZERO,
             step: "",
-            answers: vec![0; world::network().nodes.len()],
+            answers: vec![0; machine.network().nodes.len()],
             commanded: false,
             search: false,
             records_seen: 0,
@@ -110,7 +110,7 @@ impl Progress {
             );
         }
         if !self.commanded {
-            let silence = world::network().master.silence.as_millis();
+            let silence = world.machine().network().master.silence.as_millis();
             return (
                 "silent, so that drives left running come to rest",
                 format!("{silence} ms in all"),
@@ -125,7 +125,7 @@ impl Progress {
             return ("waiting for the drives to boot", nodes);
         }
         if let Some(nodes) = still_to_come(world, world::operational) {
-            let (answers, all) = self.configured();
+            let (answers, all) = self.configured(world);
             if answers < all {
                 return (
                     "configuring the drives",
@@ -143,7 +143,7 @@ impl Progress {
     /// Takes in what was on the wire since the last time: answers of the SDO
     /// servers, and LSS.
     fn read(&mut self, world: &World<'_>) {
-        let network = world::network();
+        let network = world.machine().network();
         let wire = world.wire();
         for record in wire.get(self.records_seen..).unwrap_or_default() {
             let RecordKind::Frame(frame) = &record.kind else {
@@ -164,8 +164,8 @@ impl Progress {
     }
 
     /// How much of their configuration the nodes have answered, and all of it.
-    fn configured(&self) -> (usize, usize) {
-        let network = world::network();
+    fn configured(&self, world: &World<'_>) -> (usize, usize) {
+        let network = world.machine().network();
         let answers: usize = self.answers.iter().sum();
         let all: usize = network
             .nodes
@@ -193,7 +193,9 @@ fn reads(node: &network::Node) -> usize {
 
 /// The nodes that are not yet there.
 fn still_to_come(world: &World<'_>, there: impl Fn(&DriveStatus) -> bool) -> Option<String> {
-    let nodes: Vec<String> = world::network()
+    let nodes: Vec<String> = world
+        .machine()
+        .network()
         .nodes
         .iter()
         .zip(world.statuses())

@@ -114,7 +114,7 @@ impl Summary {
                 missed: record.bus.missed,
             },
             bus: Bus {
-                bitrate: canmaster_sim::world::network().bit_rate,
+                bitrate: record.machine.network().bit_rate,
                 load_mean: rounded(record.bus.load_mean, 5),
                 load_max: rounded(record.bus.load_max, 5),
                 frames: record.bus.frames,

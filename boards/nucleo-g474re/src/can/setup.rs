@@ -14,15 +14,39 @@ use stm32g4xx_hal::{
     rcc::Rcc,
 };
 
-/// 24 MHz / 1 / (1 + 20 + 3) = 1 Mbit/s, sampled at (1 + 20) / 24 = 87.5 %, as
-/// CiA 301 recommends. The jump width is all of segment 2: the wider, the more
-/// clock error between the nodes is tolerated.
-const BIT_TIMING: NominalBitTiming = NominalBitTiming {
-    prescaler: NonZeroU16::new(1).unwrap(),
-    seg1: NonZeroU8::new(20).unwrap(),
-    seg2: NonZeroU8::new(3).unwrap(),
-    sync_jump_width: NonZeroU8::new(3).unwrap(),
-};
+/// How the controller makes a bit of its clock, the 24 MHz of the crystal. The
+/// jump width is all of segment 2: the wider, the more clock error between the
+/// nodes is tolerated.
+#[derive(Clone, Copy)]
+pub struct BitTiming(NominalBitTiming);
+
+impl BitTiming {
+    /// `prescaler` clocks are a quantum; a bit is one quantum, `seg1` quanta up to
+    /// the sample point, and `seg2` after it: 1 .. 512, 1 .. 255, 1 .. 128. 1, 20
+    /// and 3 are 1 Mbit/s, sampled at (1 + 20) / 24 = 87.5 %, as CiA 301
+    /// recommends. `None` if one is outside its range.
+    pub const fn new(prescaler: u16, seg1: u16, seg2: u16) -> Option<BitTiming> {
+        if prescaler > PRESCALER_MAX || seg1 > u8::MAX as u16 || seg2 > SEG2_MAX {
+            return None;
+        }
+        let (Some(prescaler), Some(seg1), Some(seg2)) = (
+            NonZeroU16::new(prescaler),
+            NonZeroU8::new(seg1 as u8),
+            NonZeroU8::new(seg2 as u8),
+        ) else {
+            return None;
+        };
+        Some(BitTiming(NominalBitTiming {
+            prescaler,
+            seg1,
+            seg2,
+            sync_jump_width: seg2,
+        }))
+    }
+}
+
+const PRESCALER_MAX: u16 = 512;
+const SEG2_MAX: u16 = 128;
 
 /// # Panics
 ///
@@ -33,13 +57,14 @@ pub(crate) fn setup(
     tx: PA12<AF9>,
     rx: PA11<AF9>,
     rcc: &mut Rcc,
+    timing: BitTiming,
     filters: &[RangeFilter],
 ) -> (Tx, Rx) {
     assert!(filters.len() <= FILTERS);
     let mut can = peripheral.fdcan(tx, rx, rcc);
     can.apply_config(
         FdCanConfig::default()
-            .set_nominal_bit_timing(BIT_TIMING)
+            .set_nominal_bit_timing(timing.0)
             .set_frame_transmit(FrameTransmissionConfig::ClassicCanOnly)
             .set_global_filter(GlobalFilter::reject_all()),
     );

@@ -1,0 +1,151 @@
+//! What the firmware of this project can do: profile velocity mode, every object of
+//! it in RPDO1, RPDO2, TPDO1 and TPDO2 at every SYNC.
+
+use toml::Spanned;
+
+use super::device;
+use crate::description::{Description, Node as Described};
+use crate::model::{Node, Pdo};
+use crate::object::{Address, Direction};
+use crate::resolve::Context;
+
+/// A set of TPDOs is kept in 32 bits, two of each node.
+const NODES_MAX: usize = 16;
+/// PDOs of each direction that it exchanges with an axis.
+const PDOS_MAX: u8 = 2;
+/// At every SYNC.
+const EVERY_SYNC: u8 = 1;
+const PROFILE_VELOCITY: u32 = 3;
+const MODES_OF_OPERATION: Address = Address::new(0x6060, 0);
+
+/// What it writes in every cycle, and its bits.
+const COMMANDS: [(Address, u8, &str); 4] = [
+    (Address::new(0x6040, 0), 16, "Controlword"),
+    (Address::new(0x60FF, 0), 32, "Target velocity"),
+    (Address::new(0x6083, 0), 32, "Profile acceleration"),
+    (Address::new(0x6084, 0), 32, "Profile deceleration"),
+];
+/// What it has to be told.
+const FEEDBACK: [(Address, u8, &str); 3] = [
+    (Address::new(0x6041, 0), 16, "Statusword"),
+    (Address::new(0x6064, 0), 32, "Position actual value"),
+    (Address::new(0x606C, 0), 32, "Velocity actual value"),
+];
+
+pub(crate) fn firmware(description: &Description, nodes: &[Node], context: &mut Context<'_>) {
+    if let Some(node) = description.node.get(NODES_MAX) {
+        let place = context.at(node);
+        context.problems.error(
+            &place,
+            description.node.len(),
+            format!("the firmware leads at most {NODES_MAX} axes"),
+            "remove nodes, or divide them between two boards",
+        );
+    }
+    for (place, (node, described)) in nodes.iter().zip(&description.node).enumerate() {
+        let described = described.get_ref();
+        motor(description, node, described, context);
+        let device = described.device.get_ref();
+        let mut before = description.node.iter().take(place);
+        if before.any(|other| other.get_ref().device.get_ref() == device) {
+            // Told once for all of its kind.
+            continue;
+        }
+        pdos(Direction::Receive, node, described, context);
+        pdos(Direction::Transmit, node, described, context);
+    }
+}
+
+fn motor(description: &Description, node: &Node, described: &Described, context: &mut Context<'_>) {
+    if node.increments_per_turn.is_none() {
+        let place = context.at(&described.device);
+        context.problems.error(
+            &place,
+            described.device.get_ref(),
+            format!(
+                "nobody says how many increments a turn of \"{}\" has",
+                node.name
+            ),
+            "add increments_per_turn to the axis of the device or of the node",
+        );
+    }
+    let mut modes = node
+        .start_values
+        .iter()
+        .filter(|w| w.at == MODES_OF_OPERATION);
+    if modes
+        .next_back()
+        .is_none_or(|mode| mode.value != PROFILE_VELOCITY)
+    {
+        let of_device = device(description, described).and_then(|d| d.axis.mode.as_ref());
+        let mode: Option<&Spanned<String>> = described.axis.mode.as_ref().or(of_device);
+        let place = context.at(mode.unwrap_or(&described.device));
+        context.problems.error(
+            &place,
+            mode.unwrap_or(&described.device).get_ref(),
+            "the firmware leads its axes in profile velocity mode",
+            "write mode = \"profile velocity\" in the axis",
+        );
+    }
+}
+
+fn pdos(direction: Direction, node: &Node, described: &Described, context: &mut Context<'_>) {
+    let (pdos, wanted): (&[Pdo], &[_]) = match direction {
+        Direction::Receive => (&node.rpdos, &COMMANDS),
+        Direction::Transmit => (&node.tpdos, &FEEDBACK),
+    };
+    let word = direction.word();
+    let mut problem = |value: String, rule: String, help: String| {
+        let place = context.at(&described.device);
+        context.problems.error(&place, value, rule, help);
+    };
+    for pdo in pdos {
+        let name = format!("{word}{}", pdo.number);
+        if pdo.number > PDOS_MAX {
+            problem(
+                name,
+                format!("the firmware exchanges {word}1 and {word}2 with an axis"),
+                format!("map its objects in {word}1 or {word}2"),
+            );
+            continue;
+        }
+        if pdo.transmission != EVERY_SYNC {
+            problem(
+                name.clone(),
+                "the firmware exchanges its PDOs at every SYNC".to_string(),
+                "leave transmission out, or write 1".to_string(),
+            );
+        }
+        for entry in &pdo.mapping {
+            let known = wanted.iter().any(|(at, ..)| *at == entry.at);
+            if direction == Direction::Receive && !known {
+                problem(
+                    format!("{} \"{}\"", entry.at, entry.name),
+                    format!("the firmware has nothing to write there, and it is in {name}"),
+                    "remove it from the map; a start value may write it once".to_string(),
+                );
+            }
+            if entry.bits % u8::BITS as u8 != 0 {
+                problem(
+                    format!("{} \"{}\"", entry.at, entry.name),
+                    "the firmware reads and writes whole bytes".to_string(),
+                    format!("remove it from {name}"),
+                );
+            }
+        }
+    }
+    for (at, bits, name) in wanted {
+        let entries = pdos.iter().flat_map(|pdo| &pdo.mapping);
+        let times = entries.filter(|e| e.at == *at && e.bits == *bits).count();
+        if times != 1 {
+            problem(
+                format!("{at} \"{name}\""),
+                format!(
+                    "the firmware needs it once in {word}1 or {word}2 of \"{}\"",
+                    node.name
+                ),
+                format!("map it once in {word}1 or {word}2"),
+            );
+        }
+    }
+}

@@ -1,0 +1,120 @@
+//! What the firmware of this project cannot do is refused, with the line.
+
+use std::path::Path;
+
+use canmaster_network::{Source, read_for_firmware};
+
+/// The words about the sample after `from` was replaced by `to`.
+fn refused(from: &str, to: &str) -> String {
+    let sample = sample();
+    assert!(sample.contains(from), "{from}");
+    words(&sample.replace(from, to))
+}
+
+fn sample() -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../network.toml");
+    std::fs::read_to_string(path).unwrap()
+}
+
+fn words(text: &str) -> String {
+    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let source = Source::new("network.toml", text.as_bytes());
+    let outcome = read_for_firmware(&source, &mut |file| std::fs::read(workspace.join(file)));
+    assert_eq!(outcome.machine.is_none(), !outcome.problems.is_empty());
+    let words: Vec<String> = outcome.problems.iter().map(|p| p.to_string()).collect();
+    words.join("\n\n")
+}
+
+#[track_caller]
+fn says(from: &str, to: &str, expected: &[&str]) {
+    let words = refused(from, to);
+    for expected in expected {
+        assert!(words.contains(expected), "{words}");
+    }
+}
+
+#[test]
+fn what_an_axis_needs_is_mapped_once() {
+    says(
+        r#"map = ["Velocity actual value", "Torque actual value"]"#,
+        r#"map = ["Torque actual value"]"#,
+        &[
+            "`606Ch:00 \"Velocity actual value\"`",
+            "map it once in TPDO1 or TPDO2",
+        ],
+    );
+    says(
+        r#"map = ["Profile acceleration", "Profile deceleration"]"#,
+        r#"map = ["Profile acceleration"]"#,
+        &["`6084h:00 \"Profile deceleration\"`", "device = \"epos4\""],
+    );
+}
+
+#[test]
+fn an_rpdo_carries_what_the_firmware_writes() {
+    says(
+        r#"map = ["Profile acceleration", "Profile deceleration"]"#,
+        r#"map = ["Profile acceleration", "Target torque"]"#,
+        &["nothing to write there, and it is in RPDO2"],
+    );
+}
+
+#[test]
+fn pdos_are_the_first_two_at_every_sync() {
+    says(
+        "[device.epos4.tpdo.2]",
+        "[device.epos4.tpdo.3]",
+        &[
+            "`TPDO3`",
+            "the firmware exchanges TPDO1 and TPDO2 with an axis",
+        ],
+    );
+    says("transmission = 1", "transmission = 2", &["at every SYNC"]);
+}
+
+#[test]
+fn axes_have_an_encoder_and_profile_velocity_mode() {
+    says(
+        "increments_per_turn = 2000",
+        "",
+        &["how many increments a turn of \"axis 1\" has"],
+    );
+    says(
+        r#"mode = "profile velocity""#,
+        r#"mode = "profile position""#,
+        &[
+            "`profile position`",
+            "leads its axes in profile velocity mode",
+        ],
+    );
+}
+
+#[test]
+fn order_and_division_of_the_mapping_are_free_and_torque_may_be_left_out() {
+    for (from, to) in [
+        (
+            r#"map = ["Controlword", "Target velocity"]"#,
+            r#"map = ["Target velocity", "Controlword"]"#,
+        ),
+        (
+            r#"map = ["Velocity actual value", "Torque actual value"]"#,
+            r#"map = ["Velocity actual value"]"#,
+        ),
+    ] {
+        assert_eq!(refused(from, to), "");
+    }
+}
+
+#[test]
+fn more_axes_than_it_leads() {
+    let node = |n: u32| format!("\n[[node]]\nid = {n}\nname = \"axis {n}\"\ndevice = \"epos4\"\n");
+    let more: String = (7..=17).map(node).collect();
+    let text = sample()
+        .replace("cycle_us = 10_000", "cycle_us = 20_000")
+        .replace("tpdo_deadline_us = 5_000", "tpdo_deadline_us = 9_000");
+    let words = words(&format!("{text}{more}"));
+    assert!(
+        words.contains("`17`") && words.contains("at most 16 axes"),
+        "{words}"
+    );
+}

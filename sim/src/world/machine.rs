@@ -1,0 +1,283 @@
+//! The machine that the firmware is built for, and what it does, in the judge's
+//! terms.
+
+use std::path::Path;
+use std::sync::LazyLock;
+
+use canmaster::motion::experiment::{self, Motor};
+use canmaster::motion::{AxisMove, Step};
+use canmaster::network::sample::SIX_EPOS4;
+use canmaster::network::{ConfigWrite, Identity, Master, Network, Node, Pdo};
+use canmaster::pdo::{MappingEntry, Transmission};
+use canmaster::time::Duration;
+use canmaster::{NodeId, id::Address};
+use canmaster_network::model;
+
+use crate::judge::{Assignment, Part, Traffic};
+use crate::time::Time;
+
+/// Why there is no such machine.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum MachineError {
+    /// The description is refused.
+    #[error("{0}")]
+    Refused(String),
+    /// There is nothing to be moved.
+    #[error("a machine of {0} axes cannot be simulated: describe 1 .. 16 nodes on one bus")]
+    Axes(usize),
+}
+
+/// Network, motors, and the moves that one release makes.
+#[derive(Clone, Debug)]
+pub struct Machine {
+    network: &'static Network,
+    motors: Vec<Motor>,
+    moves: Vec<Vec<Option<Part>>>,
+    round_trip: Option<Time>,
+}
+
+/// The sample: six EPOS4.
+pub fn sample() -> &'static Machine {
+    static SAMPLE: LazyLock<Machine> = LazyLock::new(|| Machine {
+        network: &SIX_EPOS4,
+        motors: vec![Motor::SAMPLE; SIX_EPOS4.nodes.len()],
+        moves: moves(experiment::GROUP.program.steps),
+        round_trip: experiment::GROUP
+            .program
+            .duration(&experiment::GROUP)
+            .ok()
+            .map(Time::from),
+    });
+    &SAMPLE
+}
+
+impl Machine {
+    /// The machine that the file at `path` describes.
+    ///
+    /// # Errors
+    /// What is wrong with the description, for a person.
+    pub fn read(path: &Path) -> Result<Machine, MachineError> {
+        let outcome = canmaster_network::load(path);
+        let Some(machine) = outcome.machine else {
+            let problems: Vec<String> = outcome.problems.iter().map(ToString::to_string).collect();
+            return Err(MachineError::Refused(problems.join("\n\n")));
+        };
+        Machine::new(&machine)
+    }
+
+    /// The machine of a description. It stays in memory until the program ends.
+    ///
+    /// # Errors
+    /// If it has no axes, or too many.
+    pub fn new(described: &model::Machine) -> Result<Machine, MachineError> {
+        let motors: Vec<Motor> = described.nodes.iter().filter_map(motor).collect();
+        let none = || MachineError::Axes(described.nodes.len());
+        let network = network(described).ok_or_else(none)?;
+        let (moves, round_trip) = program(&motors, network.cycle).ok_or_else(none)?;
+        Ok(Machine {
+            network: Box::leak(Box::new(network)),
+            motors,
+            moves,
+            round_trip,
+        })
+    }
+
+    /// The network.
+    pub fn network(&self) -> &'static Network {
+        self.network
+    }
+
+    /// The motors, in the order of the axes.
+    pub fn motors(&self) -> &[Motor] {
+        &self.motors
+    }
+
+    /// The moves that one release makes.
+    pub fn assignment(&self) -> Assignment {
+        Assignment {
+            moves: self.moves.clone(),
+            cycle: Time::from(self.network.cycle),
+        }
+    }
+
+    /// How long the program says that one round trip takes.
+    pub fn round_trip(&self) -> Option<Time> {
+        self.round_trip
+    }
+
+    /// What has to be on the bus in every cycle.
+    pub fn traffic(&self) -> Traffic {
+        Traffic {
+            bit_rate: self.network.bit_rate,
+            cycle: Time::from(self.network.cycle),
+            nodes: self.network.nodes.iter().map(|node| node.id).collect(),
+        }
+    }
+}
+
+/// Where each axis has to go, step by step.
+fn moves<const N: usize>(steps: &[Step<N>]) -> Vec<Vec<Option<Part>>> {
+    let part = |part: &AxisMove| Part {
+        target: part.target,
+        set: part.set,
+    };
+    let of_step = |step: &Step<N>| match step {
+        Step::Move(parts) => Some(parts.iter().map(|p| p.as_ref().map(part)).collect()),
+        _ => None,
+    };
+    steps.iter().filter_map(of_step).collect()
+}
+
+/// Moves and round trip of the firmware's program for these motors.
+type Moves = (Vec<Vec<Option<Part>>>, Option<Time>);
+
+fn program(motors: &[Motor], cycle: Duration) -> Option<Moves> {
+    fn of<const N: usize>(motors: &[Motor], cycle: Duration) -> Option<Moves> {
+        let motors: &[Motor; N] = motors.try_into().ok()?;
+        let steps: &'static [Step<N>] = Box::leak(Box::new(experiment::steps(motors)));
+        let group = experiment::group(motors, cycle, u8::MAX, steps);
+        let duration = group.program.duration(&group).ok();
+        Some((moves(steps), duration.map(Time::from)))
+    }
+    // The number of axes is part of the type.
+    let all = [
+        of::<1>, of::<2>, of::<3>, of::<4>, of::<5>, of::<6>, of::<7>, of::<8>, of::<9>, of::<10>,
+        of::<11>, of::<12>, of::<13>, of::<14>, of::<15>, of::<16>,
+    ];
+    all.get(motors.len().checked_sub(1)?)?(motors, cycle)
+}
+
+fn motor(node: &model::Node) -> Option<Motor> {
+    let motor = node.motor()?;
+    Some(Motor {
+        increments_per_turn: motor.increments_per_turn,
+        gear: motor.gear,
+        max_speed: motor.max_speed,
+        max_acceleration: motor.max_acceleration,
+        max_travel: motor.max_travel,
+    })
+}
+
+fn leak<T>(items: impl Iterator<Item = T>) -> &'static [T] {
+    Box::leak(items.collect())
+}
+
+/// The description as the library has it.
+fn network(described: &model::Machine) -> Option<Network> {
+    let [bus] = &described.buses[..] else {
+        return None;
+    };
+    let master = &described.master;
+    let nodes: Option<Vec<Node>> = described.nodes.iter().map(node).collect();
+    Some(Network {
+        bit_rate: bus.bit_rate,
+        cycle: Duration::from_micros(bus.cycle_us),
+        master: Master {
+            node: NodeId::new(master.node_id)?,
+            heartbeat: Duration::from_millis(master.heartbeat_ms.into()),
+            silence: Duration::from_millis(master.silence_ms),
+            boot_time: Duration::from_millis(master.boot_time_ms),
+            sdo_tries: master.sdo_tries,
+            syncs_before_start: master.syncs_before_start,
+        },
+        nodes: leak(nodes?.into_iter()),
+    })
+}
+
+fn node(node: &model::Node) -> Option<Node> {
+    let identity = &node.identity;
+    Some(Node {
+        id: NodeId::new(node.id)?,
+        name: Box::leak(node.name.clone().into_boxed_str()),
+        mandatory: node.mandatory,
+        identity: Identity {
+            device_type: identity.device_type,
+            vendor: identity.vendor,
+            product: identity.product,
+            revision: identity.revision,
+            serial: identity.serial,
+        },
+        heartbeat_ms: node.heartbeat_ms,
+        consumer_ms: node.master_timeout_ms,
+        rpdos: leak(node.rpdos.iter().map(pdo)),
+        tpdos: leak(node.tpdos.iter().map(pdo)),
+        start_values: leak(node.start_values.iter().map(write)),
+        sdo_timeout: Duration::from_millis(node.sdo_timeout_ms),
+        configured: node.configured,
+    })
+}
+
+fn pdo(pdo: &model::Pdo) -> Pdo {
+    let entry = |entry: &model::Mapped| MappingEntry(entry.word());
+    Pdo {
+        number: pdo.number,
+        transmission: Transmission::from_code(pdo.transmission),
+        mapping: leak(pdo.mapping.iter().map(entry)),
+    }
+}
+
+fn write(write: &model::Write) -> ConfigWrite {
+    let at = Address::new(write.at.index, write.at.sub);
+    match write.bytes {
+        1 => ConfigWrite::u8(at, write.value as u8),
+        2 => ConfigWrite::u16(at, write.value as u16),
+        _ => ConfigWrite::u32(at, write.value),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Ten turns of 2000 increments.
+    const TEN_TURNS: u32 = 20_000;
+
+    #[test]
+    fn every_axis_goes_at_least_ten_turns_away_and_comes_back() {
+        let assignment = sample().assignment();
+        assert_eq!(assignment.moves.len(), 2);
+        for (there, back) in assignment.moves[0].iter().zip(&assignment.moves[1]) {
+            assert!(there.unwrap().target.unsigned_abs() >= TEN_TURNS);
+            assert_eq!(back.unwrap().target, 0);
+        }
+    }
+
+    #[test]
+    fn axes_go_in_pairs_and_an_odd_one_alone() {
+        for (axes, sets) in [
+            (1, &[1][..]),
+            (2, &[1, 1]),
+            (3, &[1, 2, 1]),
+            (4, &[1, 2, 1, 2]),
+            (5, &[1, 2, 1, 2, 3]),
+            (6, &[1, 2, 1, 2, 3, 3]),
+            (7, &[1, 2, 1, 2, 3, 3, 4]),
+            (8, &[1, 2, 1, 2, 3, 3, 4, 4]),
+            (12, &[1, 2, 1, 2, 3, 3, 4, 5, 4, 5, 6, 6]),
+        ] {
+            let motors = vec![Motor::SAMPLE; axes];
+            let (moves, round_trip) = program(&motors, Duration::from_millis(10)).unwrap();
+            assert!(round_trip.is_some());
+            for parts in moves {
+                let found: Vec<u8> = parts.iter().map(|part| part.unwrap().set).collect();
+                assert_eq!(found, sets);
+            }
+        }
+        assert!(program(&[], Duration::from_millis(10)).is_none());
+        assert!(program(&[Motor::SAMPLE; 17], Duration::from_millis(10)).is_none());
+    }
+
+    #[test]
+    fn the_description_of_the_project_is_the_sample() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../network.toml");
+        let read = Machine::read(&path).unwrap();
+        assert_eq!(format!("{read:?}"), format!("{:?}", sample()));
+    }
+
+    #[test]
+    fn what_is_refused_says_why() {
+        let refused = Machine::read(Path::new("nowhere.toml")).unwrap_err();
+        assert!(refused.to_string().contains("nowhere.toml"));
+    }
+}
