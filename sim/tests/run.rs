@@ -20,7 +20,7 @@ fn run(scenario: Scenario) -> Record {
 
 fn bus_log(record: &Record) -> Vec<u8> {
     let mut log = Vec::new();
-    write_candump(&mut log, "can0", &record.wire).unwrap();
+    write_candump(&mut log, "can0", &record.buses[0].wire).unwrap();
     log
 }
 

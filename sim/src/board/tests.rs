@@ -5,6 +5,7 @@ mod flash;
 mod on_the_bus;
 mod rsemu_defects;
 mod running;
+mod three_buses;
 
 use super::api::{BoardOptions, Stop};
 use super::image::{Image, ImageSize};

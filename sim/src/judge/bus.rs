@@ -61,6 +61,39 @@ pub struct BusFigures {
     pub worst_cycle: Option<(Time, Time)>,
 }
 
+impl BusFigures {
+    /// Those of several buses together: what is counted is added up, except the
+    /// SYNCs, which leave on all of them; of the rest the worst holds, and the
+    /// first bus where there is no worst.
+    pub fn together<'f>(mut buses: impl Iterator<Item = &'f BusFigures>) -> BusFigures {
+        let add = |mut all: BusFigures, bus: &BusFigures| {
+            all.missed += bus.missed;
+            all.frames += bus.frames;
+            all.error_frames += bus.error_frames;
+            all.jitter_pp_us = all.jitter_pp_us.max(bus.jitter_pp_us);
+            all.sync_residuals_us.extend(&bus.sync_residuals_us);
+            all.load_mean = all.load_mean.max(bus.load_mean);
+            if bus.load_max > all.load_max {
+                all.load_max = bus.load_max;
+                all.worst_cycle = bus.worst_cycle;
+            }
+            all
+        };
+        let first = buses.next().cloned().unwrap_or_default();
+        buses.fold(first, add)
+    }
+}
+
+/// Starts of frame of all SYNCs.
+pub fn syncs(records: &[WireRecord]) -> Vec<Time> {
+    let is_sync = |frame: &WireFrame| frame.id == WireId::Standard(SYNC) && !frame.rtr;
+    records
+        .iter()
+        .filter(|record| matches!(&record.kind, RecordKind::Frame(frame) if is_sync(frame)))
+        .map(|record| record.sof)
+        .collect()
+}
+
 /// What was seen of one node between two SYNCs.
 #[derive(Clone, Copy, Default)]
 struct Seen {

@@ -7,6 +7,7 @@ pub mod bus;
 pub mod grid;
 pub mod lss;
 pub mod sdo;
+pub mod skew;
 pub mod verdict;
 
 pub use arrivals::{Arrival, Assignment, Part, Release, arrivals, worst_pair};

@@ -3,7 +3,7 @@
 use canmaster::NodeId;
 
 use super::stimulus::Stimulus;
-use super::{Machine, World, watch};
+use super::{FIRST, Machine, World, watch};
 use crate::board::Board;
 use crate::bus::{PortId, WireRecord};
 use crate::drive::{Drive, DriveFault, DriveStatus, PlantState};
@@ -38,7 +38,7 @@ impl World<'_> {
                 self.fault(node, DriveFault::SdoDead { at });
             }
             Stimulus::Drive { node, fault } => self.fault(node, fault),
-            Stimulus::Bus(fault) => self.bus.inject(fault),
+            Stimulus::Bus(fault) => self.lines[FIRST].bus.inject(fault),
         }
     }
 
@@ -141,9 +141,15 @@ impl World<'_> {
         (done, going_on)
     }
 
-    /// What was on the wire so far.
+    /// What was on the wire of the first bus so far.
     pub fn wire(&self) -> &[WireRecord] {
-        &self.wire
+        self.wire_of(FIRST)
+    }
+
+    /// What was on the wire of a bus so far, by its place in the machine; nothing
+    /// if there is no such bus.
+    pub fn wire_of(&self, bus: usize) -> &[WireRecord] {
+        self.lines.get(bus).map_or(&[], |line| &line.wire)
     }
 
     /// The firmware's log so far.
@@ -157,15 +163,15 @@ impl World<'_> {
         drives.into_iter().find(|drive| drive.node() == node)
     }
 
-    /// Where a drive is on the bus, if it is there.
+    /// Where a drive is on its bus, if it is there.
     pub fn drive_port(&self, node: NodeId) -> Option<PortId> {
         let (axis, _) = self.machine.network().find(node)?;
         Some(self.stations[axis].as_ref()?.port)
     }
 
-    /// Where the board is on the bus.
+    /// Where the board is on the first bus.
     pub fn board_port(&self) -> PortId {
-        self.board_port
+        self.lines[FIRST].board
     }
 
     /// The emulated board.

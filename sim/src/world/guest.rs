@@ -3,7 +3,8 @@
 
 use std::collections::VecDeque;
 
-use super::World;
+use super::line::Who;
+use super::{FIRST, World};
 use crate::bridge::Controller;
 use crate::bus::{BitTiming, Bus, Event, PortId};
 use crate::frame::WireFrame;
@@ -35,13 +36,11 @@ impl Guest {
 }
 
 impl World<'_> {
-    /// The same with a guest on the bus, at its bit rate.
+    /// The same with a guest on the first bus, at its bit rate.
     pub fn with_guest(mut self) -> Self {
-        let name = "guest".to_string();
-        let port = self.bus.attach(&name);
+        let port = self.lines[FIRST].attach("guest".to_string(), Who::Tool);
         let mut controller = Controller::default();
-        controller.start(self.machine.network().bit_rate);
-        self.ports.push(name);
+        controller.start(self.machine.segments()[FIRST].bit_rate);
         self.guest = Some(Guest {
             port,
             timing: None,

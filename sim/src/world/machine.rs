@@ -11,6 +11,7 @@ use canmaster::network::{ConfigWrite, Identity, Master, Network, Node, Pdo};
 use canmaster::pdo::{MappingEntry, Transmission};
 use canmaster::time::Duration;
 use canmaster::{NodeId, id::Address};
+use canmaster_network::frame::{SYNC_BYTES, longest_bits};
 use canmaster_network::model;
 
 use crate::judge::{Assignment, Part, Traffic};
@@ -24,14 +25,31 @@ pub enum MachineError {
     #[error("{0}")]
     Refused(String),
     /// There is nothing to be moved.
-    #[error("a machine of {0} axes cannot be simulated: describe 1 .. 16 nodes on one bus")]
+    #[error("a machine of {0} axes cannot be simulated: describe 1 .. 16 nodes")]
     Axes(usize),
+    /// One SYNC tick drives all buses.
+    #[error("the buses have different cycles: give all of them the same cycle_us")]
+    Cycles,
 }
 
-/// Network, motors, and the moves that one release makes.
+/// One bus of a machine.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Segment {
+    /// Its name.
+    pub name: String,
+    /// Which of the board's controllers drives it: 0 is FDCAN1.
+    pub controller: usize,
+    /// bit/s
+    pub bit_rate: u32,
+    /// The axes whose drives are on it, by their place in the network.
+    pub axes: Vec<usize>,
+}
+
+/// Network, buses, motors, and the moves that one release makes.
 #[derive(Clone, Debug)]
 pub struct Machine {
     network: &'static Network,
+    segments: Vec<Segment>,
     motors: Vec<Motor>,
     moves: Vec<Vec<Option<Part>>>,
     round_trip: Option<Time>,
@@ -41,6 +59,7 @@ pub struct Machine {
 pub fn sample() -> &'static Machine {
     static SAMPLE: LazyLock<Machine> = LazyLock::new(|| Machine {
         network: &SIX_EPOS4,
+        segments: vec![sample_segment()],
         motors: vec![Motor::SAMPLE; SIX_EPOS4.nodes.len()],
         moves: moves(experiment::GROUP.program.steps),
         round_trip: experiment::GROUP
@@ -73,10 +92,19 @@ impl Machine {
     pub fn new(described: &model::Machine) -> Result<Machine, MachineError> {
         let motors: Vec<Motor> = described.nodes.iter().filter_map(motor).collect();
         let none = || MachineError::Axes(described.nodes.len());
+        let cycle = described.buses.first().map(|bus| bus.cycle_us);
+        if described
+            .buses
+            .iter()
+            .any(|bus| Some(bus.cycle_us) != cycle)
+        {
+            return Err(MachineError::Cycles);
+        }
         let network = network(described).ok_or_else(none)?;
         let (moves, round_trip) = program(&motors, network.cycle).ok_or_else(none)?;
         Ok(Machine {
             network: Box::leak(Box::new(network)),
+            segments: segments(described),
             motors,
             moves,
             round_trip,
@@ -86,6 +114,17 @@ impl Machine {
     /// The network.
     pub fn network(&self) -> &'static Network {
         self.network
+    }
+
+    /// The buses, in the order of the description; there is at least one.
+    pub fn segments(&self) -> &[Segment] {
+        &self.segments
+    }
+
+    /// The place of the bus that the drive of an axis is on.
+    pub fn segment_of(&self, axis: usize) -> usize {
+        let on = |segment: &Segment| segment.axes.contains(&axis);
+        self.segments.iter().position(on).unwrap_or(0)
     }
 
     /// The motors, in the order of the axes.
@@ -106,13 +145,26 @@ impl Machine {
         self.round_trip
     }
 
-    /// What has to be on the bus in every cycle.
-    pub fn traffic(&self) -> Traffic {
+    /// What has to be on a bus in every cycle.
+    pub fn traffic(&self, segment: &Segment) -> Traffic {
+        let node = |axis: &usize| self.network.nodes.get(*axis).map(|node| node.id);
         Traffic {
-            bit_rate: self.network.bit_rate,
+            bit_rate: segment.bit_rate,
             cycle: Time::from(self.network.cycle),
-            nodes: self.network.nodes.iter().map(|node| node.id).collect(),
+            nodes: segment.axes.iter().filter_map(node).collect(),
         }
+    }
+
+    /// No master can have a shorter cycle: SYNC and the PDOs of every cycle, with
+    /// all the stuff bits that there may be, on the bus that has the most of them.
+    pub fn wire_bound_us(&self) -> u32 {
+        let of = |segment: &Segment| {
+            let node = |axis: &usize| self.network.nodes.get(*axis);
+            let pdos = segment.axes.iter().filter_map(node).flat_map(pdo_bits);
+            let bits = pdos.sum::<u32>() + longest_bits(SYNC_BYTES);
+            (u64::from(bits) * US_PER_S).div_ceil(u64::from(segment.bit_rate)) as u32
+        };
+        self.segments.iter().map(of).max().unwrap_or(0)
     }
 }
 
@@ -163,11 +215,54 @@ fn leak<T>(items: impl Iterator<Item = T>) -> &'static [T] {
     Box::leak(items.collect())
 }
 
+/// The buses of a description.
+fn segments(described: &model::Machine) -> Vec<Segment> {
+    let buses = described.buses.iter().enumerate();
+    buses
+        .map(|(place, bus)| {
+            let nodes = described.nodes.iter().enumerate();
+            let on_it = nodes.filter(|(_, node)| node.bus == place);
+            Segment {
+                name: bus.name.clone(),
+                controller: usize::from(bus.peripheral.saturating_sub(1)),
+                bit_rate: bus.bit_rate,
+                axes: on_it.map(|(axis, _)| axis).collect(),
+            }
+        })
+        .collect()
+}
+
+/// Transmission type: with every SYNC.
+const EVERY_SYNC: u8 = 1;
+const US_PER_S: u64 = 1_000_000;
+
+/// The sample's only bus.
+fn sample_segment() -> Segment {
+    Segment {
+        name: "main".to_string(),
+        controller: 0,
+        bit_rate: SIX_EPOS4.bit_rate,
+        axes: (0..SIX_EPOS4.nodes.len()).collect(),
+    }
+}
+
+/// Bits of the PDOs of a node that are on the bus in every cycle, at worst.
+fn pdo_bits(node: &Node) -> impl Iterator<Item = u32> {
+    let pdos = node.rpdos.iter().chain(node.tpdos);
+    let every_cycle = pdos.filter(|pdo| pdo.transmission == Transmission::from_code(EVERY_SYNC));
+    every_cycle.map(|pdo| {
+        let bits: u32 = pdo
+            .mapping
+            .iter()
+            .map(|entry| u32::from(entry.bits()))
+            .sum();
+        longest_bits(bits.div_ceil(u8::BITS) as u8)
+    })
+}
+
 /// The description as the library has it.
 fn network(described: &model::Machine) -> Option<Network> {
-    let [bus] = &described.buses[..] else {
-        return None;
-    };
+    let bus = described.buses.first()?;
     let master = &described.master;
     let nodes: Option<Vec<Node>> = described.nodes.iter().map(node).collect();
     Some(Network {

@@ -5,6 +5,7 @@ mod bench;
 mod client;
 mod guest;
 mod image;
+mod line;
 mod machine;
 mod operator;
 mod record;
@@ -18,8 +19,8 @@ mod watch;
 
 pub use client::Client;
 pub use image::{Image, ImageError};
-pub use machine::{Machine, MachineError, sample};
-pub use record::{AxisRecord, Record};
+pub use machine::{Machine, MachineError, Segment, sample};
+pub use record::{AxisRecord, BusRecord, Record};
 pub use scenario::{Ailment, Scenario};
 pub use stimulus::Stimulus;
 pub use watch::Startup;
@@ -30,17 +31,20 @@ use rand_pcg::Pcg64Mcg;
 
 use crate::board::{Board, BoardError, BoardOptions, ResetCause};
 use crate::bridge::Bridge;
-use crate::bus::{BitTiming, Bus, Event, PortId, WireRecord};
+use crate::bus::Event;
 use crate::drive::{DriveConfig, DriveStatus, cia402};
 use crate::judge::Assignment;
 use crate::log::{LogDecoder, LogLine};
 use crate::time::Time;
+use line::{Line, Who};
 use operator::Operator;
 use record::Seen;
 use station::Station;
 use stimulus::Agenda;
 use watch::Watch;
 
+/// The bus that is meant where none is named.
+const FIRST: usize = 0;
 /// Keeps the board's random numbers apart from everybody else's.
 const BOARD_STREAM: u64 = 0x0B0A_4D00;
 /// Largest errors of the board's oscillators: of any node's crystal, and what
@@ -75,14 +79,12 @@ pub struct World<'i> {
     now: Time,
     next_look: Time,
     board: Board,
-    board_port: PortId,
-    board_timing: Option<BitTiming>,
-    bus: Bus,
+    /// In the order of the machine's buses.
+    lines: Vec<Line>,
     /// In the order of the network; `None`: not on the bus.
     stations: Vec<Option<Station>>,
     /// Drives that the network does not name.
     strangers: Vec<Station>,
-    ports: Vec<String>,
     bridge: Option<Bridge>,
     guest: Option<guest::Guest>,
     agenda: Agenda,
@@ -93,34 +95,36 @@ pub struct World<'i> {
     complained: Option<Time>,
     halted: Option<String>,
     in_motion: Vec<Stimulus>,
-    wire: Vec<WireRecord>,
     events: Vec<Event>,
     rtt: Vec<u8>,
-    lines: Vec<LogLine>,
+    told: Vec<LogLine>,
 }
 
 impl<'i> World<'i> {
     /// Puts the machine together and switches it on.
     pub fn new(image: &'i Image, scenario: Scenario) -> Result<World<'i>, BoardError> {
-        let mut bus = Bus::new(scenario.seed);
-        let mut ports = vec!["board".to_string()];
-        let board_port = bus.attach(&ports[0]);
         let board = Board::new(image.elf(), board_options(&scenario))?;
         let machine = image.machine();
-        let bit_rate = machine.network().bit_rate;
-        let mut connect = |config: DriveConfig| {
+        let segments = machine.segments().iter().enumerate();
+        let mut lines: Vec<Line> = segments
+            .map(|(number, segment)| Line::new(segment, number, scenario.seed))
+            .collect();
+        let mut connect = |config: DriveConfig, line: usize, who: Who| {
             let name = format!("node {}", config.node.get());
-            let port = bus.attach(&name);
-            ports.push(name);
-            Station::new(config, port)
+            let port = lines[line].attach(name, who);
+            Station::new(config, line, port)
         };
         let mut stations = Vec::new();
-        for config in station::machine(machine, &scenario) {
-            stations.push(config.map(&mut connect));
+        for (axis, config) in station::machine(machine, &scenario).into_iter().enumerate() {
+            let line = machine.segment_of(axis);
+            stations.push(config.map(|config| connect(config, line, Who::Axis(axis))));
         }
-        let strangers = scenario.strangers.iter().cloned();
-        let strangers = strangers.map(|config| connect(DriveConfig { bit_rate, ..config }));
-        let strangers = strangers.collect();
+        let mut strangers = Vec::new();
+        for (number, config) in scenario.strangers.iter().cloned().enumerate() {
+            let bit_rate = machine.segments()[FIRST].bit_rate;
+            let config = DriveConfig { bit_rate, ..config };
+            strangers.push(connect(config, FIRST, Who::Stranger(number)));
+        }
         let assignment = machine.assignment();
         let moves = (0..stations.len())
             .map(|axis| assignment.of_axis(axis).count())
@@ -142,12 +146,9 @@ impl<'i> World<'i> {
             now: Time::ZERO,
             next_look: Time::ZERO,
             board,
-            board_port,
-            board_timing: None,
-            bus,
+            lines,
             stations,
             strangers,
-            ports,
             bridge: None,
             guest: None,
             agenda,
@@ -157,17 +158,19 @@ impl<'i> World<'i> {
             log: Vec::new(),
             complained: None,
             halted: None,
-            wire: Vec::new(),
             events: Vec::new(),
             rtt: Vec::new(),
-            lines: Vec::new(),
+            told: Vec::new(),
         })
     }
 
-    /// The same with a bridge for other tools on the bus. Such a run does not
-    /// end before its time when the firmware gives up.
+    /// The same with a bridge for other tools on the first bus. Such a run does
+    /// not end before its time when the firmware gives up.
     pub fn with_bridge(mut self, mut bridge: Bridge) -> World<'i> {
-        self.ports.extend(bridge.attach(&mut self.bus));
+        let line = &mut self.lines[FIRST];
+        for name in bridge.attach(&mut line.bus) {
+            line.note(name, Who::Tool);
+        }
         self.bridge = Some(bridge);
         self
     }
@@ -202,7 +205,7 @@ impl<'i> World<'i> {
 
     /// Ends the run and judges it.
     pub fn finish(mut self) -> Record {
-        self.wire.extend(self.bus.take_records());
+        self.lines.iter_mut().for_each(Line::read);
         let unfinished = self.unfinished();
         let complaints = self.complaints();
         let axes = self
@@ -221,8 +224,7 @@ impl<'i> World<'i> {
             seed: self.scenario.seed,
             simulated: self.now,
             machine: self.machine.clone(),
-            ports: self.ports,
-            wire: self.wire,
+            lines: self.lines,
             log: self.log,
             axes,
             releases: self.watch.releases,
@@ -231,7 +233,7 @@ impl<'i> World<'i> {
             complaints,
             unfinished,
         }
-        .judge(&self.assignment, &self.machine.traffic())
+        .judge(&self.assignment)
     }
 
     /// What the board has noticed: crashes, resets that nobody ordered, wrong

@@ -3,13 +3,14 @@
 use canmaster::NodeId;
 
 use super::Machine;
+use super::line::Line;
 use super::watch::Startup;
 use crate::board::BoardStats;
-use crate::bus::WireRecord;
+use crate::bus::{PortId, WireRecord};
 use crate::drive::DriveStatus;
 use crate::judge::{
-    Arrival, Assignment, AxisMonitor, BusFigures, Evidence, LssFigures, Release, Traffic, Verdict,
-    arrivals, bus, lss, verdict,
+    Arrival, Assignment, AxisMonitor, BusFigures, Evidence, LssFigures, Release, Verdict, arrivals,
+    bus, lss, skew::skew_us, verdict,
 };
 use crate::log::LogLine;
 use crate::time::Time;
@@ -25,13 +26,29 @@ pub struct AxisRecord {
     pub motion: AxisMonitor,
 }
 
+/// One bus at the end of a run.
+#[derive(Clone, Debug)]
+pub struct BusRecord {
+    /// Its name.
+    pub name: String,
+    /// bit/s
+    pub bit_rate: u32,
+    /// Names of its ports, by number.
+    pub ports: Vec<String>,
+    /// The board's port.
+    pub board: PortId,
+    /// Everything that was on the wire.
+    pub wire: Vec<WireRecord>,
+    /// What came of it.
+    pub figures: BusFigures,
+}
+
 /// What was seen, before it is judged.
 pub(super) struct Seen {
     pub(super) seed: u64,
     pub(super) simulated: Time,
     pub(super) machine: Machine,
-    pub(super) ports: Vec<String>,
-    pub(super) wire: Vec<WireRecord>,
+    pub(super) lines: Vec<Line>,
     pub(super) log: Vec<(Time, LogLine)>,
     pub(super) axes: Vec<AxisRecord>,
     pub(super) releases: Vec<Release>,
@@ -50,10 +67,8 @@ pub struct Record {
     pub simulated: Time,
     /// The machine that moved.
     pub machine: Machine,
-    /// Names of the bus's ports, by number.
-    pub ports: Vec<String>,
-    /// Everything that was on the wire.
-    pub wire: Vec<WireRecord>,
+    /// The buses, in the order of the machine's.
+    pub buses: Vec<BusRecord>,
     /// The firmware's log, and when each line reached the host.
     pub log: Vec<(Time, LogLine)>,
     /// The axes, in the order of the network.
@@ -66,8 +81,11 @@ pub struct Record {
     pub startup: Startup,
     /// The search for drives without node-ID, if there was one.
     pub lss: Option<LssFigures>,
-    /// Figures of the bus.
+    /// Figures of all buses together.
     pub bus: BusFigures,
+    /// How far the SYNCs of one cycle are apart on different buses, at worst,
+    /// microseconds.
+    pub skew_us: f64,
     /// Figures of the emulated board.
     pub board: BoardStats,
     /// Wrong use of the hardware that the emulated board noticed.
@@ -78,10 +96,28 @@ pub struct Record {
 
 impl Seen {
     /// Judges what was seen.
-    pub(super) fn judge(self, assignment: &Assignment, traffic: &Traffic) -> Record {
+    pub(super) fn judge(self, assignment: &Assignment) -> Record {
         let nodes: Vec<NodeId> = self.axes.iter().map(|axis| axis.node).collect();
         let motion: Vec<AxisMonitor> = self.axes.iter().map(|axis| axis.motion.clone()).collect();
-        let figures = bus::judge(&self.wire, traffic, self.simulated);
+        let buses: Vec<BusRecord> = self
+            .machine
+            .segments()
+            .iter()
+            .zip(self.lines)
+            .map(|(segment, line)| {
+                let traffic = self.machine.traffic(segment);
+                BusRecord {
+                    name: segment.name.clone(),
+                    bit_rate: segment.bit_rate,
+                    ports: line.names,
+                    board: line.board,
+                    figures: bus::judge(&line.wire, &traffic, self.simulated),
+                    wire: line.wire,
+                }
+            })
+            .collect();
+        let figures = BusFigures::together(buses.iter().map(|bus| &bus.figures));
+        let syncs: Vec<_> = buses.iter().map(|bus| bus::syncs(&bus.wire)).collect();
         let arrived = arrivals(&nodes, &motion, assignment, &self.releases);
         let error_line = first_error(&self.log).map(|line| line.message.as_str());
         let verdict = verdict(&Evidence {
@@ -97,12 +133,12 @@ impl Seen {
             unfinished: &self.unfinished,
         });
         Record {
-            lss: lss::judge(&self.wire),
+            lss: buses.iter().find_map(|bus| lss::judge(&bus.wire)),
+            skew_us: skew_us(&syncs, assignment.cycle),
             seed: self.seed,
             simulated: self.simulated,
             machine: self.machine,
-            ports: self.ports,
-            wire: self.wire,
+            buses,
             log: self.log,
             axes: self.axes,
             releases: self.releases,

@@ -23,14 +23,17 @@ const STRANGER: NodeId = NodeId::constant::<126>();
 /// A drive with its place on the bus.
 pub(super) struct Station {
     pub(super) drive: Drive,
+    /// Which bus, and where on it.
+    pub(super) line: usize,
     pub(super) port: PortId,
     timing: Option<BitTiming>,
 }
 
 impl Station {
-    pub(super) fn new(config: DriveConfig, port: PortId) -> Station {
+    pub(super) fn new(config: DriveConfig, line: usize, port: PortId) -> Station {
         Station {
             drive: Drive::new(config),
+            line,
             port,
             timing: None,
         }
@@ -53,9 +56,10 @@ impl Station {
 /// The drives of the network, in its order; `None`: not on the bus.
 pub(super) fn machine(machine: &Machine, scenario: &Scenario) -> Vec<Option<DriveConfig>> {
     let mut random = Pcg64Mcg::seed_from_u64(scenario.seed ^ FACTORY_STREAM);
-    let mut drive = |node: &Node, motor: &Motor| {
+    let mut drive = |axis: usize, node: &Node, motor: &Motor| {
         let faults = scenario.faults.get(&node.id).into_iter().flatten().copied();
-        let described = described(node, motor, machine, scenario.seed);
+        let bit_rate = machine.segments()[machine.segment_of(axis)].bit_rate;
+        let described = described(node, motor, bit_rate, scenario.seed);
         let config = (scenario.tuned)(described);
         let mut config = faults.fold(config, DriveConfig::with);
         if scenario.factory {
@@ -66,14 +70,17 @@ pub(super) fn machine(machine: &Machine, scenario: &Scenario) -> Vec<Option<Driv
     };
     let nodes = machine.network().nodes.iter().zip(machine.motors());
     nodes
-        .map(|(node, motor)| (!scenario.without.contains(&node.id)).then(|| drive(node, motor)))
+        .enumerate()
+        .map(|(axis, (node, motor))| {
+            (!scenario.without.contains(&node.id)).then(|| drive(axis, node, motor))
+        })
         .collect()
 }
 
 /// The drive as the network describes it: bit rate, identity, encoder.
-fn described(node: &Node, motor: &Motor, machine: &Machine, seed: u64) -> DriveConfig {
+fn described(node: &Node, motor: &Motor, bit_rate: u32, seed: u64) -> DriveConfig {
     let mut config = DriveConfig::new(node.id, seed);
-    config.bit_rate = machine.network().bit_rate;
+    config.bit_rate = bit_rate;
     config.plant.increments_per_turn = motor.increments_per_turn;
     let (wanted, own) = (&node.identity, &mut config.identity);
     for (wanted, own) in [

@@ -1,10 +1,11 @@
 //! The event loop: the board runs until something else happens, then the bus,
 //! then the drives; and now and then the machine is looked at.
 
+use super::line::{Line, Who};
 use super::operator::View;
 use super::station::Station;
 use super::watch::AxisTruth;
-use super::{Observer, World, enabled, operational};
+use super::{FIRST, Observer, World, enabled, operational};
 use crate::board::Stop;
 use crate::drive::Drive;
 use crate::log::Level;
@@ -12,8 +13,6 @@ use crate::time::Time;
 
 /// How often the machine is looked at: truth of the plant, log, operator.
 const LOOK: Time = Time::from_us(200);
-/// The board's only CAN controller in use.
-const FDCAN1: usize = 0;
 /// After a complaint of the firmware and standstill, how long it may go on to
 /// say why.
 const LAST_WORDS: Time = Time::from_ms(200);
@@ -38,8 +37,9 @@ impl World<'_> {
             }
         };
         self.now = reached;
-        self.offer_board();
-        self.advance_bus();
+        for place in 0..self.lines.len() {
+            self.advance_line(place);
+        }
         self.advance_drives();
         if self.now >= self.next_look {
             self.next_look = self.now + LOOK;
@@ -50,16 +50,14 @@ impl World<'_> {
     /// When something happens next that is not the board's doing.
     fn next_moment(&self) -> Time {
         let deadlines = self.drives().map(|station| station.drive.next_deadline());
-        [
-            self.bus.next_event(),
-            self.agenda.next(),
-            Some(self.next_look),
-        ]
-        .into_iter()
-        .flatten()
-        .chain(deadlines)
-        .min()
-        .unwrap_or(self.next_look)
+        let lines = self.lines.iter().filter_map(|line| line.bus.next_event());
+        [self.agenda.next(), Some(self.next_look)]
+            .into_iter()
+            .flatten()
+            .chain(lines)
+            .chain(deadlines)
+            .min()
+            .unwrap_or(self.next_look)
     }
 
     /// Every drive on the bus, those of no network too.
@@ -67,56 +65,56 @@ impl World<'_> {
         self.stations.iter().flatten().chain(&self.strangers)
     }
 
-    fn offer_board(&mut self) {
-        let timing = self.board.can_timing(FDCAN1);
-        if timing != self.board_timing {
-            self.board_timing = timing;
-            self.bus.set_timing(self.board_port, timing, self.now);
+    fn advance_line(&mut self, place: usize) {
+        let line = &mut self.lines[place];
+        line.offer_board(&self.board, self.now);
+        line.bus.advance(self.now, &mut self.events);
+        if self.events.is_empty() {
+            return;
         }
-        self.bus
-            .offer(self.board_port, self.board.can_offer(FDCAN1));
-    }
-
-    fn advance_bus(&mut self) {
-        let mut events = std::mem::take(&mut self.events);
-        self.bus.advance(self.now, &mut events);
-        for event in &events {
-            if event.port == self.board_port {
-                self.board.can_event(FDCAN1, event);
-            } else if let Some(station) = drives(&mut self.stations, &mut self.strangers)
-                .find(|station| station.port == event.port)
-            {
-                station.drive.on_event(event);
-            } else {
-                if let Some(bridge) = &mut self.bridge {
-                    bridge.on_event(event);
+        for event in self.events.drain(..) {
+            let station = match line.who(event.port) {
+                Who::Board => {
+                    line.tell_board(&mut self.board, &event);
+                    continue;
                 }
-                if let Some(guest) = &mut self.guest {
-                    guest.on_event(event);
-                }
+                Who::Axis(axis) => self.stations[axis].as_mut(),
+                Who::Stranger(number) => self.strangers.get_mut(number),
+                Who::Tool => None,
+            };
+            if let Some(station) = station {
+                station.drive.on_event(&event);
+                continue;
+            }
+            if let Some(bridge) = &mut self.bridge {
+                bridge.on_event(&event);
+            }
+            if let Some(guest) = &mut self.guest {
+                guest.on_event(&event);
             }
         }
-        if !events.is_empty() {
-            self.offer_board();
-        }
-        events.clear();
-        self.events = events;
+        line.offer_board(&self.board, self.now);
     }
 
     fn advance_drives(&mut self) {
         for station in drives(&mut self.stations, &mut self.strangers) {
-            station.advance(&mut self.bus, self.now);
+            station.advance(&mut self.lines[station.line].bus, self.now);
         }
+        self.offer_tools();
+    }
+
+    fn offer_tools(&mut self) {
+        let first = &mut self.lines[FIRST].bus;
         if let Some(bridge) = &mut self.bridge {
-            bridge.offer(&mut self.bus, self.now);
+            bridge.offer(first, self.now);
         }
         if let Some(guest) = &mut self.guest {
-            guest.offer(&mut self.bus, self.now);
+            guest.offer(first, self.now);
         }
     }
 
     fn look(&mut self, observer: &mut dyn Observer) {
-        self.wire.extend(self.bus.take_records());
+        self.lines.iter_mut().for_each(Line::read);
         self.read_log(observer);
         for station in drives(&mut self.stations, &mut self.strangers) {
             // Control cycles that nobody waits for have not been worked out yet.
@@ -139,15 +137,15 @@ impl World<'_> {
         observer.look(self);
         if let Some(bridge) = &mut self.bridge {
             bridge.exchange(self.now);
-            bridge.offer(&mut self.bus, self.now);
+            bridge.offer(&mut self.lines[FIRST].bus, self.now);
         }
     }
 
     fn read_log(&mut self, observer: &mut dyn Observer) {
         self.rtt.clear();
         self.board.drain_rtt(&mut self.rtt);
-        self.decoder.decode(&self.rtt, &mut self.lines);
-        for line in self.lines.drain(..) {
+        self.decoder.decode(&self.rtt, &mut self.told);
+        for line in self.told.drain(..) {
             observer.log(self.now, &line);
             if line.level == Some(Level::Error) && self.complained.is_none() {
                 self.complained = Some(self.now);

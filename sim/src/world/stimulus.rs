@@ -47,7 +47,7 @@ pub enum Stimulus {
         /// What.
         fault: DriveFault,
     },
-    /// The bus gets a fault.
+    /// The first bus gets a fault.
     Bus(BusFault),
 }
 

@@ -3,7 +3,7 @@
 use canmaster_sim::bus::RecordKind;
 use canmaster_sim::frame::WireId;
 use canmaster_sim::time::Time;
-use canmaster_sim::world::Record;
+use canmaster_sim::world::{BusRecord, Record};
 
 /// One frame in the picture.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,13 +44,13 @@ const PAUSE_US: f64 = 500.0;
 
 /// The moments between which the picture is drawn: a cycle in the middle of
 /// the first motion, or else the fullest one.
-pub(super) fn chosen_cycle(record: &Record) -> Option<(Time, Time)> {
+pub(super) fn chosen_cycle(record: &Record, bus: &BusRecord) -> Option<(Time, Time)> {
     let released = record
         .releases
         .first()
         .map(|release| release.at + Time::from_ms(500));
     let syncs = || {
-        record.wire.iter().filter_map(|wire| match &wire.kind {
+        bus.wire.iter().filter_map(|wire| match &wire.kind {
             RecordKind::Frame(frame) if frame.id == WireId::Standard(SYNC) => Some(wire.sof),
             _ => None,
         })
@@ -59,11 +59,11 @@ pub(super) fn chosen_cycle(record: &Record) -> Option<(Time, Time)> {
         let mut following = syncs().skip_while(|at| *at < from);
         Some((following.next()?, following.next()?))
     });
-    in_motion.or(record.bus.worst_cycle)
+    in_motion.or(bus.figures.worst_cycle)
 }
 
 /// The frames of that time, in lanes; empty lanes are left out.
-pub(super) fn lanes(record: &Record, from: Time, to: Time) -> Vec<Lane> {
+pub(super) fn lanes(record: &Record, bus: &BusRecord, from: Time, to: Time) -> Vec<Lane> {
     let mut lanes: Vec<Lane> = LANES
         .iter()
         .map(|(name, _)| Lane {
@@ -71,7 +71,7 @@ pub(super) fn lanes(record: &Record, from: Time, to: Time) -> Vec<Lane> {
             frames: Vec::new(),
         })
         .collect();
-    for wire in &record.wire {
+    for wire in &bus.wire {
         if wire.sof < from || wire.sof >= to {
             continue;
         }

@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 
 use anyhow::Result;
 use canmaster_sim::judge::Outcome;
-use canmaster_sim::world::Record;
+use canmaster_sim::world::{BusRecord, Record};
 
 use crate::run::summary::Summary;
 use charts::{Curve, OverTime};
@@ -38,8 +38,12 @@ pub(crate) fn html(record: &Record, summary: &Summary) -> Result<String> {
     )?;
     verdict(&mut page, record)?;
     axes(&mut page, record)?;
-    bus_cycle(&mut page, record)?;
-    jitter(&mut page, record)?;
+    for bus in &record.buses {
+        bus_cycle(&mut page, record, bus)?;
+    }
+    for bus in &record.buses {
+        jitter(&mut page, record, bus)?;
+    }
     figures(&mut page, summary)?;
     write!(
         page,
@@ -138,16 +142,25 @@ fn motion(record: &Record) -> [(&'static str, &'static str, OverTime<'static>); 
     ]
 }
 
-fn bus_cycle(page: &mut String, record: &Record) -> Result<()> {
-    let Some((from, to)) = frames::chosen_cycle(record) else {
+/// What tells the buses apart in a heading: nothing where there is only one.
+fn of_bus(record: &Record, bus: &BusRecord) -> String {
+    if record.buses.len() == 1 {
+        return String::new();
+    }
+    format!(" \"{}\"", escape(&bus.name))
+}
+
+fn bus_cycle(page: &mut String, record: &Record, bus: &BusRecord) -> Result<()> {
+    let Some((from, to)) = frames::chosen_cycle(record, bus) else {
         return Ok(());
     };
-    let lanes = frames::lanes(record, from, to);
+    let lanes = frames::lanes(record, bus, from, to);
+    let name = of_bus(record, bus);
     let cycle_us = to.since(from).as_us_f64();
     let busy_us = frames::busy_until(&lanes);
     write!(
         page,
-        "<h2>One cycle of the bus, to scale</h2>\n<p>The cycle that begins at {from} s. \
+        "<h2>One cycle of the bus{name}, to scale</h2>\n<p>The cycle that begins at {from} s. \
          Colours are the nodes' of the curves above; black is the master alone.</p>\n{}\n",
         charts::cycle(&lanes, 0.0, cycle_us)?
     )?;
@@ -161,14 +174,15 @@ fn bus_cycle(page: &mut String, record: &Record) -> Result<()> {
     Ok(())
 }
 
-fn jitter(page: &mut String, record: &Record) -> Result<()> {
+fn jitter(page: &mut String, record: &Record, bus: &BusRecord) -> Result<()> {
+    let (name, bus) = (of_bus(record, bus), &bus.figures);
     write!(
         page,
-        "<h2>SYNC jitter</h2>\n<p>{} SYNC frames; {:.2} us peak to peak, period {:.3} us.</p>\n{}\n",
-        record.bus.sync_count,
-        record.bus.jitter_pp_us,
-        record.bus.sync_period_us,
-        charts::histogram(&record.bus.sync_residuals_us)?
+        "<h2>SYNC jitter{name}</h2>\n<p>{} SYNC frames; {:.2} us peak to peak, period {:.3} us.</p>\n{}\n",
+        bus.sync_count,
+        bus.jitter_pp_us,
+        bus.sync_period_us,
+        charts::histogram(&bus.sync_residuals_us)?
     )?;
     Ok(())
 }

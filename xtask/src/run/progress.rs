@@ -42,7 +42,8 @@ pub(super) struct Progress {
     commanded: bool,
     /// The master looks for drives without node-ID.
     search: bool,
-    records_seen: usize,
+    /// By bus.
+    records_seen: Vec<usize>,
 }
 
 impl Progress {
@@ -64,7 +65,7 @@ impl Progress {
             answers: vec![0; machine.network().nodes.len()],
             commanded: false,
             search: false,
-            records_seen: 0,
+            records_seen: vec![0; machine.segments().len()],
         }
     }
 
@@ -144,8 +145,13 @@ impl Progress {
     /// servers, and LSS.
     fn read(&mut self, world: &World<'_>) {
         let network = world.machine().network();
-        let wire = world.wire();
-        for record in wire.get(self.records_seen..).unwrap_or_default() {
+        let seen = &mut self.records_seen;
+        let new = seen.iter_mut().enumerate().flat_map(|(bus, seen)| {
+            let wire = world.wire_of(bus);
+            let from = std::mem::replace(seen, wire.len());
+            wire.get(from..).unwrap_or_default()
+        });
+        for record in new {
             let RecordKind::Frame(frame) = &record.kind else {
                 continue;
             };
@@ -160,7 +166,6 @@ impl Progress {
                 *count += 1;
             }
         }
-        self.records_seen = wire.len();
     }
 
     /// How much of their configuration the nodes have answered, and all of it.

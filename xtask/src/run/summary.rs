@@ -4,8 +4,9 @@ use std::time::Duration;
 
 use canmaster_sim::board::irqs;
 use canmaster_sim::drive::cia402::State;
+use canmaster_sim::judge::BusFigures;
 use canmaster_sim::time::Time;
-use canmaster_sim::world::{AxisRecord, Record};
+use canmaster_sim::world::{AxisRecord, BusRecord, Record};
 use serde::Serialize;
 
 use crate::image::ImageSize;
@@ -21,6 +22,9 @@ pub(crate) struct Summary {
     pub(crate) wall_s: f64,
     pub(crate) sync: Sync,
     pub(crate) bus: Bus,
+    /// Each bus, where there are several.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    buses: Vec<OneBus>,
     pub(crate) cpu: Cpu,
     image: Image,
     pub(crate) startup: Startup,
@@ -34,6 +38,9 @@ pub(crate) struct Sync {
     count: usize,
     pub(crate) jitter_pp_us: f64,
     pub(crate) missed: usize,
+    /// Between the buses, where there are several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    skew_us: Option<f64>,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -43,6 +50,15 @@ pub(crate) struct Bus {
     pub(crate) load_max: f64,
     frames: usize,
     pub(crate) error_frames: usize,
+}
+
+/// A bus among several.
+#[derive(Clone, Debug, Serialize)]
+struct OneBus {
+    name: String,
+    sync: Sync,
+    #[serde(flatten)]
+    bus: Bus,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -108,18 +124,11 @@ impl Summary {
             simulated_s: rounded(record.simulated.as_secs_f64(), 6),
             wall_s: rounded(wall.as_secs_f64(), 3),
             sync: Sync {
-                period_us: rounded(record.bus.sync_period_us, 3),
-                count: record.bus.sync_count,
-                jitter_pp_us: rounded(record.bus.jitter_pp_us, 3),
-                missed: record.bus.missed,
+                skew_us: (record.buses.len() > 1).then(|| rounded(record.skew_us, 3)),
+                ..Sync::of(&record.bus)
             },
-            bus: Bus {
-                bitrate: record.machine.network().bit_rate,
-                load_mean: rounded(record.bus.load_mean, 5),
-                load_max: rounded(record.bus.load_max, 5),
-                frames: record.bus.frames,
-                error_frames: record.bus.error_frames,
-            },
+            bus: Bus::of(&record.bus, record.machine.network().bit_rate),
+            buses: buses(record),
             cpu: cpu(record),
             image: Image {
                 flash_bytes: image.flash_bytes,
@@ -225,6 +234,10 @@ impl Summary {
                 ),
             ),
         ];
+        for one in &self.buses {
+            let words = format!("{}: {}; {}", one.name, one.sync.words(), one.bus.words());
+            facts.push(("bus", words));
+        }
         if let Some(lss) = &self.startup.lss {
             facts.push(("LSS", lss.words()));
         }
@@ -260,15 +273,53 @@ impl Lss {
 }
 
 impl Sync {
+    fn of(bus: &BusFigures) -> Sync {
+        Sync {
+            period_us: rounded(bus.sync_period_us, 3),
+            count: bus.sync_count,
+            jitter_pp_us: rounded(bus.jitter_pp_us, 3),
+            missed: bus.missed,
+            skew_us: None,
+        }
+    }
+
     fn words(&self) -> String {
+        let skew = self.skew_us.map(|us| format!(", skew {us:.2} us"));
         format!(
-            "{} frames, period {:.3} us, jitter {:.2} us peak to peak, {} missed",
-            self.count, self.period_us, self.jitter_pp_us, self.missed
+            "{} frames, period {:.3} us, jitter {:.2} us peak to peak{}, {} missed",
+            self.count,
+            self.period_us,
+            self.jitter_pp_us,
+            skew.unwrap_or_default(),
+            self.missed
         )
     }
 }
 
+/// Each bus; none where there is only one, which is the whole.
+fn buses(record: &Record) -> Vec<OneBus> {
+    if record.buses.len() == 1 {
+        return Vec::new();
+    }
+    let one = |bus: &BusRecord| OneBus {
+        name: bus.name.clone(),
+        sync: Sync::of(&bus.figures),
+        bus: Bus::of(&bus.figures, bus.bit_rate),
+    };
+    record.buses.iter().map(one).collect()
+}
+
 impl Bus {
+    fn of(bus: &BusFigures, bitrate: u32) -> Bus {
+        Bus {
+            bitrate,
+            load_mean: rounded(bus.load_mean, 5),
+            load_max: rounded(bus.load_max, 5),
+            frames: bus.frames,
+            error_frames: bus.error_frames,
+        }
+    }
+
     fn words(&self) -> String {
         format!(
             "{} bit/s, load {} mean, {} worst cycle; {} frames, {} error frames",
