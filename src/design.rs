@@ -31,13 +31,6 @@ pub const fn tx_queue(axes: usize) -> usize {
 /// at 1 Mbit/s for longer than the millisecond after which the next are made.
 pub const OWN_FRAMES: usize = 10;
 
-/// From the last TPDO to the first RPDO, in microseconds: the steps of the axes.
-pub const STEPS_US: u16 = 500;
-
-/// The longest period of the SYNC that the 16 bits of the deadline's timer count,
-/// in microseconds.
-pub const LONGEST_CYCLE_US: u32 = u16::MAX as u32;
-
 /// Changed settings that may wait for `network`, which takes them every
 /// millisecond: a write of 1016h makes one for each node, one for a node outside
 /// the network, and a client has no time for more than four writes (of two frames

@@ -265,7 +265,8 @@ impl Layout {
         self.least_cycle_us() <= self.cycle_us
     }
 
-    fn least_cycle_us(&self) -> u32 {
+    /// The shortest cycle with as many heartbeats in it.
+    pub(crate) fn least_cycle_us(&self) -> u32 {
         let bits_ns = u64::from(self.bits()) * self.demand.bit_ns();
         let limit = u64::from(self.demand.load_limit.max(1));
         let by_load = (bits_ns * PER_MILLE).div_ceil(limit).div_ceil(NS_PER_US) as u32;

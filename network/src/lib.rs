@@ -7,6 +7,7 @@
 //! firmware is made of, so that the firmware's build script can use it.
 
 mod check;
+mod cycles;
 pub mod derive;
 mod description;
 pub mod eds;
@@ -24,7 +25,7 @@ pub mod timing;
 pub use problem::{Problem, Severity};
 pub use source::Source;
 
-use std::io;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use description::Description;
@@ -48,10 +49,10 @@ pub struct Outcome {
 /// this project can do.
 pub fn load(path: &Path) -> Outcome {
     let name = path.display().to_string();
-    match std::fs::read(path) {
+    match read_file(path) {
         Ok(bytes) => {
             let source = Source::new(name, &bytes);
-            read_for_firmware(&source, &mut |file| std::fs::read(file))
+            read_for_firmware(&source, &mut read_file)
         }
         Err(error) => {
             let source = Source::new(&name, b"");
@@ -69,6 +70,20 @@ pub fn load(path: &Path) -> Outcome {
             }
         }
     }
+}
+
+/// No description and no EDS is longer.
+const LONGEST_FILE: u64 = 16 * 1024 * 1024;
+
+/// The bytes of a file, if it has no more than anybody would write.
+fn read_file(path: &Path) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let file = std::fs::File::open(path)?;
+    file.take(LONGEST_FILE + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > LONGEST_FILE {
+        return Err(io::ErrorKind::FileTooLarge.into());
+    }
+    Ok(bytes)
 }
 
 /// The same from memory: `open` gives the bytes of the files that the description

@@ -105,8 +105,8 @@ pub struct Motor {
     pub max_speed: u32,
     /// rpm/s
     pub max_acceleration: u32,
-    /// From home, in increments.
-    pub max_travel: u32,
+    /// No farther from home than these, in increments: the lower, the upper.
+    pub limits: (i32, i32),
 }
 
 /// Objects of CiA 402 that limit an axis.
@@ -117,6 +117,7 @@ const MIN_POSITION: Address = Address::new(0x607D, 1);
 const MAX_POSITION: Address = Address::new(0x607D, 2);
 /// What is not limited is a number that the firmware can still count with.
 const UNLIMITED: u32 = i32::MAX as u32;
+const ANYWHERE: (i32, i32) = (-i32::MAX, i32::MAX);
 
 impl Node {
     /// Its motor, within the limits that are written to the drive. `None`
@@ -126,18 +127,20 @@ impl Node {
             let write = self.start_values.iter().rfind(|write| write.at == at);
             write.map(|write| write.value)
         };
-        let least = |all: &[Address], magnitude: fn(u32) -> u32| {
-            let values = all.iter().filter_map(|at| written(*at)).map(magnitude);
+        let least = |all: &[Address]| {
+            let values = all.iter().filter_map(|at| written(*at));
             values.min().unwrap_or(UNLIMITED).min(UNLIMITED)
+        };
+        let limits = match (written(MIN_POSITION), written(MAX_POSITION)) {
+            (Some(least), Some(most)) => (least as i32, most as i32),
+            _ => ANYWHERE,
         };
         Some(Motor {
             increments_per_turn: self.increments_per_turn?,
             gear: self.gear,
-            max_speed: least(&[MAX_PROFILE_VELOCITY, MAX_MOTOR_SPEED], |rpm| rpm),
-            max_acceleration: least(&[MAX_ACCELERATION], |rpm_s| rpm_s),
-            max_travel: least(&[MIN_POSITION, MAX_POSITION], |position| {
-                (position as i32).unsigned_abs()
-            }),
+            max_speed: least(&[MAX_PROFILE_VELOCITY, MAX_MOTOR_SPEED]),
+            max_acceleration: least(&[MAX_ACCELERATION]),
+            limits,
         })
     }
 }

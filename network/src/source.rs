@@ -11,6 +11,8 @@ pub struct Source(Rc<Inner>);
 struct Inner {
     name: String,
     text: String,
+    /// Where each line begins.
+    starts: Vec<usize>,
 }
 
 impl Source {
@@ -23,9 +25,14 @@ impl Source {
         };
         // One kind of line end, so that everybody counts the same lines.
         let text = text.replace("\r\n", "\n").replace('\r', "\n");
+        let ends = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n');
+        let starts = std::iter::once(0)
+            .chain(ends.map(|(end, _)| end + 1))
+            .collect();
         Source(Rc::new(Inner {
             name: name.into(),
             text,
+            starts,
         }))
     }
 
@@ -41,8 +48,7 @@ impl Source {
 
     /// The line, counted from 1, in which `offset` lies.
     pub fn line_of(&self, offset: usize) -> u32 {
-        let before = self.text().bytes().take(offset);
-        1 + before.filter(|byte| *byte == b'\n').count() as u32
+        self.0.starts.partition_point(|start| *start <= offset) as u32
     }
 
     /// What stands in a range, if it is one.
@@ -52,7 +58,9 @@ impl Source {
 
     /// A whole line without what surrounds it, counted from 1.
     pub fn line(&self, number: u32) -> &str {
-        let skip = (number as usize).saturating_sub(1);
-        self.text().lines().nth(skip).unwrap_or_default().trim()
+        let place = (number as usize).saturating_sub(1);
+        let start = self.0.starts.get(place).copied();
+        let line = start.and_then(|start| self.text().get(start..)?.lines().next());
+        line.unwrap_or_default().trim()
     }
 }

@@ -90,6 +90,42 @@ fn axes_have_an_encoder_and_profile_velocity_mode() {
 }
 
 #[test]
+fn numbers_that_no_axis_can_be_led_with() {
+    for (from, to, value, help) in [
+        (
+            "increments_per_turn = 2000",
+            "increments_per_turn = 99",
+            "`99`",
+            "write at least 100",
+        ),
+        ("max_speed = 3_000", "max_speed = 59", "`59`", "at least 60"),
+        (
+            "max_acceleration = 20_000",
+            "max_acceleration = 99",
+            "`99`",
+            "at least 100",
+        ),
+        (
+            "# homing_method = 37",
+            "min_position = -2_999\nmax_position = 0 #",
+            "`2999`",
+            "no room for a turn",
+        ),
+    ] {
+        says(from, to, &[value, help]);
+    }
+    for (from, to) in [
+        ("max_speed = 3_000", "max_speed = 60"),
+        (
+            "# homing_method = 37",
+            "min_position = -3_000\nmax_position = 1 #",
+        ),
+    ] {
+        assert_eq!(refused(from, to), "");
+    }
+}
+
+#[test]
 fn order_and_division_of_the_mapping_are_free_and_torque_may_be_left_out() {
     for (from, to) in [
         (

@@ -4,7 +4,7 @@ use std::io;
 use std::path::Path;
 
 use canmaster_network::eds::Eds;
-use canmaster_network::{Source, derive, read};
+use canmaster_network::{Source, derive, read, read_for_firmware};
 use proptest::prelude::*;
 
 fn root() -> std::path::PathBuf {
@@ -95,7 +95,9 @@ proptest! {
     fn damaged_toml(damage in damage()) {
         let eds = epos4();
         let toml = damaged(sample(), &damage);
-        let outcome = read(&Source::new("network.toml", &toml), &mut |_| Ok(eds.clone()));
+        let source = Source::new("network.toml", &toml);
+        let _ = read(&source, &mut |_| Ok(eds.clone()));
+        let outcome = read_for_firmware(&source, &mut |_| Ok(eds.clone()));
         match outcome.machine {
             None => prop_assert!(!outcome.problems.is_empty()),
             Some(machine) => {
@@ -103,6 +105,8 @@ proptest! {
                 for bus in 0..machine.buses.len() {
                     let _ = derive::dbc(&machine, bus);
                     let _ = derive::picture(&machine.buses[bus].layout, 80);
+                    let cycles = machine.buses[bus].cycles();
+                    prop_assert!(cycles.contains(&machine.buses[bus].cycle_us));
                 }
                 for node in &machine.nodes {
                     let _ = derive::concise_dcf(&machine.master, node);

@@ -34,27 +34,13 @@ pub(crate) static PDOS: [AxisPdos; AXES] = match AxisPdos::of_all(&NETWORK) {
 /// Bytes of the TPDOs of each axis.
 pub(crate) static TPDO_BYTES: [[u8; TPDOS_PER_AXIS]; AXES] = AxisPdos::tpdo_bytes(&PDOS);
 
-/// The deadline of the TPDOs, the steps of the axes, and the RPDOs; the cycle, if
-/// that is less, as the description was checked for it.
-const BUSY_US: u32 = {
-    let busy = (TPDO_DEADLINE_US + design::STEPS_US + RPDOS_US) as u32;
-    least(busy, NETWORK.cycle.as_micros())
-};
-
-const fn least(a: u32, b: u32) -> u32 {
-    if a < b { a } else { b }
-}
-
-/// What the firmware can do of 1006h and 1007h: the shortest period is that of the
-/// description's check, the longest what the timers count.
+/// What the firmware takes for 1006h and 1007h: the periods that pass the check of
+/// the description, and a window that holds the deadline of the TPDOs, the steps of
+/// the axes and the RPDOs.
 pub(crate) const SYNC_LIMITS: SyncLimits = SyncLimits {
-    shortest_period: if generated::SHORTEST_CYCLE_US > BUSY_US {
-        generated::SHORTEST_CYCLE_US
-    } else {
-        BUSY_US
-    },
-    longest_period: design::LONGEST_CYCLE_US,
-    shortest_window: BUSY_US,
+    shortest_period: generated::SHORTEST_CYCLE_US,
+    longest_period: generated::LONGEST_CYCLE_US,
+    shortest_window: (TPDO_DEADLINE_US + generated::COMPUTE_US + RPDOS_US) as u32,
 };
 
 /// Frames that may wait for a transmit buffer.

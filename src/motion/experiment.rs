@@ -29,8 +29,8 @@ pub struct Motor {
     pub max_speed: u32,
     /// No harder, rpm/s of the motor (60C5h).
     pub max_acceleration: u32,
-    /// No farther from home, increments (607Dh).
-    pub max_travel: u32,
+    /// No farther from home than these, increments (607Dh): the lower, the upper.
+    pub limits: (i32, i32),
 }
 
 impl Motor {
@@ -40,43 +40,65 @@ impl Motor {
         gear: (1, 1),
         max_speed: 3000,
         max_acceleration: 20_000,
-        max_travel: i32::MAX as u32,
+        limits: (-i32::MAX, i32::MAX),
     };
 
     /// The motor with its drive as the group leads it.
     const fn config(&self, cycle: Duration) -> AxisConfig {
         let turn = self.increments_per_turn;
+        let (lower, upper) = self.room();
         AxisConfig {
             increments_per_turn: turn,
             velocity_max: least(VELOCITY_MAX, self.max_speed),
             acceleration_max: least(ACCELERATION_MAX, self.max_acceleration),
-            travel_max: least(TRAVEL_MAX.saturating_mul(turn), self.max_travel),
-            // A quarter turn. A velocity loop 5 ms slower than assumed is 300
-            // increments late at 1800 rpm until the position loop has caught up.
-            following_error_max: turn / 4,
+            travel_max: if -lower > upper { -lower } else { upper } as u32,
+            following_error_max: self.following_error(),
             in_position: 2,
             tuning: Tuning::for_cycle(cycle),
         }
     }
 
-    /// There and back: what of the part `turns` of the load come to, within the
-    /// limits of the axis.
+    /// A quarter turn. A velocity loop 5 ms slower than assumed is 300 increments
+    /// of 2000 late at 1800 rpm until the position loop has caught up.
+    const fn following_error(&self) -> u32 {
+        self.increments_per_turn / 4
+    }
+
+    /// How far from home a target may be, in increments: the lower end, 0 at
+    /// most, and the upper, 0 at least. The position may be off by the following
+    /// error before the group stops, and is still within the limits.
+    const fn room(&self) -> (i64, i64) {
+        let (lower, upper) = self.limits;
+        let margin = self.following_error() as i64;
+        let far = TRAVEL_MAX as i64 * self.increments_per_turn as i64;
+        (
+            between(lower as i64 + margin, -far, 0),
+            between(upper as i64 - margin, 0, far),
+        )
+    }
+
+    /// What `turns` of the load come to, in increments; if there is more room on
+    /// the other side of home than this way, that way.
     const fn target(&self, turns: i32) -> i32 {
         let motor = turns as i64 * self.increments_per_turn as i64 * self.gear.0 as i64;
         let increments = motor / self.gear.1 as i64;
-        let most = self.config(Duration::from_millis(1)).travel_max as i64;
-        if increments > most {
-            most as i32
-        } else if increments < -most {
-            -most as i32
+        let (least, most) = self.room();
+        let (there, other) = (
+            between(increments, least, most),
+            between(-increments, least, most),
+        );
+        if there.abs() >= other.abs() {
+            there as i32
         } else {
-            increments as i32
+            other as i32
         }
     }
 }
 
 /// 20 % above the fastest move, rpm: room for the position loop.
 const VELOCITY_MAX: u32 = 2200;
+/// Of a stop, if the motors can, rpm/s.
+const STOP_DECELERATION: u32 = 3000;
 /// Twice the steepest ramp of the program, rpm/s.
 const ACCELERATION_MAX: u32 = 4000;
 /// Turns of the motor from home.
@@ -84,6 +106,16 @@ const TRAVEL_MAX: u32 = 1000;
 
 const fn least(a: u32, b: u32) -> u32 {
     if a < b { a } else { b }
+}
+
+const fn between(x: i64, least: i64, most: i64) -> i64 {
+    if x < least {
+        least
+    } else if x > most {
+        most
+    } else {
+        x
+    }
 }
 
 /// What one pair does in one move: turns, rpm, rpm/s up, rpm/s down.
@@ -177,11 +209,13 @@ pub const fn group<const N: usize>(
     steps: &'static [Step<N>],
 ) -> GroupConfig<N> {
     let mut axes = [Motor::SAMPLE.config(cycle); N];
+    let mut stop_deceleration = STOP_DECELERATION;
     let (mut left, mut given): (&mut [AxisConfig], &[Motor]) = (&mut axes, motors);
     while let (Some((axis, more)), Some((motor, others))) =
         (left.split_first_mut(), given.split_first())
     {
         *axis = motor.config(cycle);
+        stop_deceleration = least(stop_deceleration, motor.max_acceleration);
         (left, given) = (more, others);
     }
     GroupConfig {
@@ -194,7 +228,7 @@ pub const fn group<const N: usize>(
         // A drive may wait for standstill for 1 s on the way down (30E0h:3).
         enable_timeout: Duration::from_millis(2000),
         missing_tpdo_max,
-        stop_deceleration: 3000,
+        stop_deceleration,
         // 606Ch carries 1 rpm of noise, the creeping of the position loop 3 rpm.
         standstill_rpm: 6,
         settle_cycles: 5,

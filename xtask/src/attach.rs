@@ -25,18 +25,19 @@ pub(crate) fn flash(options: &MachineOptions) -> Result<ExitCode> {
 }
 
 /// `cargo xtask attach`: show the log of a running board, which goes on
-/// undisturbed.
-pub(crate) fn attach() -> Result<ExitCode> {
-    // Whatever machine it was built for: the log's strings are the same.
-    probe_rs("attach", &MachineOptions { network: None })
+/// undisturbed. It has to be told the machine that the board was built for: where
+/// the log lies, and its strings, are in the image.
+pub(crate) fn attach(options: &MachineOptions) -> Result<ExitCode> {
+    probe_rs("attach", options)
 }
 
 fn probe_rs(subcommand: &str, options: &MachineOptions) -> Result<ExitCode> {
-    // Looked for first: nobody wants to wait for a build to be told this.
+    let checked = Checked::read(options.network.as_deref())?;
+    // Nobody wants to wait for a build to be told this.
     if Command::new("probe-rs").arg("--version").output().is_err() {
         bail!("{INSTALL}");
     }
-    let elf = Checked::read(options.network.as_deref())?.build()?;
+    let elf = checked.build()?;
     let mut command = arguments(subcommand, &elf);
     let status = command
         .status()

@@ -193,7 +193,7 @@ fn default(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::check::DESCRIPTION;
+    use crate::machine::DESCRIPTION;
     use crate::{cargo, library};
     use canmaster_network::Source;
     use canmaster_network::object::Address as At;

@@ -8,14 +8,11 @@ use anyhow::{Context, Result};
 use canmaster_network::derive::{concise_dcf, dbc, picture};
 use canmaster_network::layout::{Layout, SlotKind};
 use canmaster_network::model::{Bus, Machine};
-use canmaster_network::{Severity, load};
 
 use crate::cli::CheckOptions;
-use crate::table;
-use crate::{board_eds, cargo, library};
+use crate::machine::{Description, counted};
+use crate::{board_eds, cargo, library, table};
 
-/// The description of this project.
-pub(crate) const DESCRIPTION: &str = "network.toml";
 /// Letters of the picture of a cycle.
 const WIDTH: usize = 72;
 const NS_PER_US: u64 = 1000;
@@ -34,42 +31,18 @@ const ROWS: [(SlotKind, &str); 7] = [
 
 /// `cargo xtask check`.
 pub(crate) fn command(options: &CheckOptions) -> Result<ExitCode> {
-    let workspace = cargo::workspace();
-    let path = match &options.file {
-        Some(file) => file.clone(),
-        // Named as a user in the project's folder names it.
-        None if Path::new(DESCRIPTION).exists() => DESCRIPTION.into(),
-        None => workspace.join(DESCRIPTION),
-    };
-    let outcome = load(&path);
-    for problem in &outcome.problems {
-        eprintln!("{problem}\n");
-    }
-    let count = |severity| {
-        outcome
-            .problems
-            .iter()
-            .filter(|p| p.severity == severity)
-            .count()
-    };
-    let Some(machine) = outcome.machine else {
-        eprintln!(
-            "{}: refused, {} errors",
-            path.display(),
-            count(Severity::Error)
-        );
-        return Ok(ExitCode::FAILURE);
-    };
+    let checked = Description::check(options.file.as_deref())?;
+    let machine = &checked.machine;
     for bus in &machine.buses {
         show(bus);
     }
-    let folder = workspace.join("target").join("network");
-    derived(&machine, &folder)?;
+    let folder = cargo::workspace().join("target").join("network");
+    derived(machine, &folder)?;
     println!(
-        "{}: {} nodes, {} warnings; derived files are in {}",
-        path.display(),
-        machine.nodes.len(),
-        count(Severity::Warning),
+        "{}: {}, {}; derived files are in {}",
+        checked.path.display(),
+        counted(machine.nodes.len(), "node"),
+        counted(checked.warnings, "warning"),
         folder.display()
     );
     Ok(ExitCode::SUCCESS)
@@ -116,7 +89,9 @@ fn show(bus: &Bus) {
     }
     table::align_right(&mut cycle, &[1, 2, 3, 4]);
     println!("{cycle}\n{}", picture(layout, WIDTH));
-    println!("{}\n", summary(layout));
+    println!("{}", summary(layout));
+    let (shortest, longest) = bus.cycles().into_inner();
+    println!("1006h may be written {shortest} .. {longest} us\n");
 }
 
 fn summary(layout: &Layout) -> String {

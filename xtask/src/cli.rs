@@ -61,7 +61,7 @@ fn usage() -> clap::builder::StyledStr {
 
 #[derive(Subcommand)]
 pub(crate) enum Command {
-    /// Build the firmware, boot it on the emulated board, move six motors
+    /// Build the firmware, boot it on the emulated board, move the motors
     Run(RunOptions),
     /// Build the firmware and run all tests
     Test(TestOptions),
@@ -72,7 +72,7 @@ pub(crate) enum Command {
     /// Write the image to a board with probe-rs and show its log
     Flash(MachineOptions),
     /// Show the log of a board that is running already
-    Attach,
+    Attach(MachineOptions),
     /// Check the description of the machine and lay out its cycle
     Check(CheckOptions),
     /// Start a machine of your own from the sample

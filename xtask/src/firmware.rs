@@ -1,5 +1,7 @@
 //! Building the image that is flashed, and that the emulated board boots.
 
+use std::fs;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Stdio};
 
@@ -9,6 +11,12 @@ use serde::Deserialize;
 use crate::cli::MachineOptions;
 use crate::machine::Checked;
 use crate::{cargo, toolchain};
+
+/// Where images are kept, each in a folder of its machine: cargo's own place is
+/// taken by the next that is built.
+const IMAGES: &str = "images";
+/// The folder of the machine of this project.
+const PROJECT: &str = "project";
 
 /// Name of the binary.
 const BINARY: &str = "canmaster";
@@ -52,18 +60,28 @@ pub(crate) fn build() -> Result<PathBuf> {
     if let Some(image) = std::env::var_os(IMAGE_VARIABLE) {
         return Ok(PathBuf::from(image));
     }
-    make(cargo_for_target("build"))
+    make(cargo_for_target("build"), PROJECT)
 }
 
 /// Builds the image for the machine that `description`, an absolute path,
-/// describes. The next build takes its place.
+/// describes.
 pub(crate) fn build_for(description: &Path) -> Result<PathBuf> {
     let mut command = cargo_for_target("build");
     command.env(NETWORK_VARIABLE, description);
-    make(command)
+    make(command, &folder(description))
 }
 
-fn make(mut command: Command) -> Result<PathBuf> {
+/// A folder that belongs to one description: named like its own, and by a number
+/// that differs from path to path.
+fn folder(description: &Path) -> String {
+    let parent = description.parent().and_then(Path::file_name);
+    let name = parent.unwrap_or_default().to_string_lossy();
+    let mut hasher = DefaultHasher::new();
+    description.hash(&mut hasher);
+    format!("{name}-{:08x}", hasher.finish() as u32)
+}
+
+fn make(mut command: Command, machine: &str) -> Result<PathBuf> {
     toolchain::ensure_target()?;
     let output = command
         .arg("--message-format=json-render-diagnostics")
@@ -78,7 +96,15 @@ fn make(mut command: Command) -> Result<PathBuf> {
             output.status
         );
     }
-    executable(&output.stdout).context("cargo built no executable of that name")
+    let built = executable(&output.stdout).context("cargo built no executable of that name")?;
+    let kept = cargo::workspace().join("target").join(IMAGES).join(machine);
+    fs::create_dir_all(&kept).with_context(|| kept.display().to_string())?;
+    let kept = kept.join(BINARY);
+    // In one step, for somebody may be reading the last one.
+    let new = kept.with_extension("new");
+    fs::copy(&built, &new).with_context(|| new.display().to_string())?;
+    fs::rename(&new, &kept).with_context(|| kept.display().to_string())?;
+    Ok(kept)
 }
 
 /// One of cargo's messages; the others lack the fields.
@@ -110,6 +136,14 @@ fn executable(messages: &[u8]) -> Option<PathBuf> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn machines_of_the_same_name_have_folders_of_their_own() {
+        let [one, other] = ["/a/mine/network.toml", "/b/mine/network.toml"].map(Path::new);
+        assert!(folder(one).starts_with("mine-"));
+        assert_ne!(folder(one), folder(other));
+        assert_eq!(folder(one), folder(one));
+    }
 
     #[test]
     fn the_image_is_found_among_the_messages() {

@@ -87,34 +87,36 @@ impl Budget {
         toml::from_str(&text).with_context(|| format!("{}", path.display()))
     }
 
-    /// Whether another machine than the sample needs too much RAM, in words: up to
-    /// six axes what the sample may, up to twelve what twelve may.
-    pub(crate) fn ram_exceeded_by(&self, size: &ImageSize, axes: usize) -> Option<String> {
-        let (used, budget) = match axes {
-            0..=SAMPLE_AXES => (size.ram_bytes, self.ram_bytes),
-            _ => (size.ram_bytes, self.ram_bytes_12_axes),
+    /// The budget of a machine: with more axes than the sample, twelve or fewer,
+    /// that of twelve.
+    pub(crate) fn of(self, axes: usize) -> Budget {
+        let ram_bytes = match axes {
+            0..=SAMPLE_AXES => self.ram_bytes,
+            _ => self.ram_bytes_12_axes,
         };
-        (used > budget).then(|| {
-            format!("the image needs {used} bytes of RAM, the budget for {axes} axes is {budget}")
-        })
+        Budget { ram_bytes, ..self }
+    }
+
+    /// Whether the image needs too much RAM, in words.
+    pub(crate) fn ram_exceeded_by(&self, size: &ImageSize) -> Option<String> {
+        exceeded("RAM", size.ram_bytes, self.ram_bytes)
     }
 
     /// What is above the budget, in words; empty if nothing is.
     pub(crate) fn exceeded_by(&self, size: &ImageSize) -> Vec<String> {
-        [
-            ("flash", size.flash_bytes, self.flash_bytes),
-            ("RAM", size.ram_bytes, self.ram_bytes),
-        ]
-        .into_iter()
-        .filter(|(_, used, budget)| used > budget)
-        .map(|(what, used, budget)| {
-            format!(
-                "the image needs {used} bytes of {what}, {} more than the budget of {budget}",
-                used - budget
-            )
-        })
-        .collect()
+        let flash = exceeded("flash", size.flash_bytes, self.flash_bytes);
+        flash
+            .into_iter()
+            .chain(self.ram_exceeded_by(size))
+            .collect()
     }
+}
+
+fn exceeded(what: &str, used: u64, budget: u64) -> Option<String> {
+    let over = used.checked_sub(budget).filter(|over| *over > 0)?;
+    Some(format!(
+        "the image needs {used} bytes of {what}, {over} more than the budget of {budget}"
+    ))
 }
 
 #[cfg(test)]
@@ -148,7 +150,7 @@ mod tests {
             (20, 12, false),
             (21, 7, true),
         ] {
-            let exceeded = budget.ram_exceeded_by(&image(1000, ram), axes);
+            let exceeded = budget.of(axes).ram_exceeded_by(&image(1000, ram));
             assert_eq!(exceeded.is_some(), over, "{ram} {axes}");
         }
     }

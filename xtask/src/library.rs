@@ -90,7 +90,7 @@ fn write(write: &model::Write) -> Result<ConfigWrite> {
 mod tests {
     use super::*;
     use crate::cargo;
-    use crate::check::DESCRIPTION;
+    use crate::machine::DESCRIPTION;
 
     #[test]
     fn the_sample_is_the_network_that_the_firmware_has() {

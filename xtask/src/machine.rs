@@ -4,17 +4,70 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
-use canmaster_network::{Severity, load};
+use canmaster_network::{Severity, load, model};
 use canmaster_sim::world::{Image, Machine};
 
-use crate::check::DESCRIPTION;
 use crate::{cargo, firmware};
 
+/// The description of this project.
+pub(crate) const DESCRIPTION: &str = "network.toml";
+
 /// A description without errors.
+pub(crate) struct Description {
+    /// As the user names it.
+    pub(crate) path: PathBuf,
+    /// What it describes.
+    pub(crate) machine: model::Machine,
+    pub(crate) warnings: usize,
+}
+
+impl Description {
+    /// Checks the description in `file`; without, that of the project. What is
+    /// wrong is said on standard error.
+    ///
+    /// # Errors
+    /// If it is refused: where, and how many errors there are.
+    pub(crate) fn check(file: Option<&Path>) -> Result<Description> {
+        let path = match file {
+            Some(file) => file.to_path_buf(),
+            None => of_project(),
+        };
+        let outcome = load(&path);
+        for problem in &outcome.problems {
+            eprintln!("{problem}\n");
+        }
+        let is_error = |problem: &&canmaster_network::Problem| problem.severity == Severity::Error;
+        let errors = outcome.problems.iter().filter(is_error).count();
+        let Some(machine) = outcome.machine else {
+            bail!("{}: refused, {}", path.display(), counted(errors, "error"));
+        };
+        let warnings = outcome.problems.len() - errors;
+        Ok(Description {
+            path,
+            machine,
+            warnings,
+        })
+    }
+}
+
+/// The description of the project, as a user in the project's folder names it.
+fn of_project() -> PathBuf {
+    let path = cargo::workspace().join(DESCRIPTION);
+    let here = std::env::current_dir().ok();
+    let near = here.and_then(|here| path.strip_prefix(here).ok().map(PathBuf::from));
+    near.unwrap_or(path)
+}
+
+/// How many there are of something.
+pub(crate) fn counted(number: usize, what: &str) -> String {
+    let plural = if number == 1 { "" } else { "s" };
+    format!("{number} {what}{plural}")
+}
+
+/// A machine that can be built for and simulated.
 pub(crate) struct Checked {
     /// `None`: that of the project.
     path: Option<PathBuf>,
-    /// What it describes.
     pub(crate) machine: Machine,
 }
 
@@ -26,24 +79,16 @@ impl Checked {
             Some(file) => Some(std::path::absolute(file).context("no current folder")?),
             None => None,
         };
-        let shown = match file {
-            Some(file) => file.to_path_buf(),
-            None => cargo::workspace().join(DESCRIPTION),
-        };
-        let outcome = load(&shown);
-        for problem in &outcome.problems {
-            eprintln!("{problem}\n");
-        }
-        let Some(described) = outcome.machine else {
-            let errors = outcome.problems.iter();
-            let errors = errors.filter(|problem| problem.severity == Severity::Error);
-            bail!("{}: refused, {} errors", shown.display(), errors.count());
-        };
-        let machine = Machine::new(&described)?;
+        let machine = Machine::new(&Description::check(file)?.machine)?;
         Ok(Checked { path, machine })
     }
 
-    /// Builds the firmware for it.
+    /// The axes that the firmware leads.
+    pub(crate) fn axes(&self) -> usize {
+        self.machine.network().nodes.len()
+    }
+
+    /// Builds the firmware for it and says where it is.
     pub(crate) fn build(&self) -> Result<PathBuf> {
         match &self.path {
             Some(path) => firmware::build_for(path),
@@ -55,5 +100,23 @@ impl Checked {
     pub(crate) fn image(&self, elf: &Path) -> Result<Image> {
         let image = Image::read(elf).context("the firmware image cannot be run")?;
         Ok(image.built_for(self.machine.clone()))
+    }
+
+    /// Builds the firmware for it, to be run.
+    pub(crate) fn built(&self) -> Result<Image> {
+        eprintln!("Building the firmware.");
+        self.image(&self.build()?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_is_not_many() {
+        assert_eq!(counted(0, "error"), "0 errors");
+        assert_eq!(counted(1, "error"), "1 error");
+        assert_eq!(counted(12, "node"), "12 nodes");
     }
 }

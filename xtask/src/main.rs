@@ -36,7 +36,7 @@ fn main() -> ExitCode {
         Command::Build(options) => firmware::command(&options),
         Command::Size(options) => size::command(&options),
         Command::Flash(options) => attach::flash(&options),
-        Command::Attach => attach::attach(),
+        Command::Attach(options) => attach::attach(&options),
         Command::Check(options) => check::command(&options),
         Command::New(options) => new::command(&options),
         Command::Capacity(options) => capacity::command(&options),

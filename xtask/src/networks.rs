@@ -6,13 +6,12 @@ use std::fs;
 use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
-use canmaster_network::{Source, read};
+use canmaster_network::{Source, read_for_firmware};
 use canmaster_sim::judge::Outcome;
 use canmaster_sim::world::{Image, Record, Scenario, World};
 
-use crate::check::DESCRIPTION;
 use crate::image::{Budget, ImageSize};
-use crate::machine::Checked;
+use crate::machine::{Checked, DESCRIPTION, counted};
 use crate::{cargo, new, run};
 
 /// Numbers of drives.
@@ -103,7 +102,8 @@ impl Variant {
     pub(crate) fn name(&self) -> String {
         let kilobits = self.bit_rate / MS_US;
         let mapped = if self.remapped { ", other mapping" } else { "" };
-        format!("{} axes at {kilobits} kbit/s{mapped}", self.axes)
+        let drives = counted(self.axes.into(), "drive");
+        format!("{drives} at {kilobits} kbit/s{mapped}")
     }
 
     /// Writes the description and builds the image; too large is an error.
@@ -111,7 +111,7 @@ impl Variant {
         let checked = Checked::read(Some(&self.write()?))?;
         let elf = checked.build()?;
         let size = ImageSize::read(&elf)?;
-        let over = Budget::read()?.ram_exceeded_by(&size, self.axes.into());
+        let over = Budget::read()?.of(self.axes.into()).ram_exceeded_by(&size);
         if let Some(words) = over {
             bail!("{}: {words} ({})", self.name(), Budget::FILE);
         }
@@ -130,7 +130,8 @@ impl Variant {
 
     /// Puts the machine into a folder of its own and says where its description is.
     fn write(&self) -> Result<PathBuf> {
-        let folder = format!("{}-axes-{}", self.axes, self.bit_rate);
+        let mapped = if self.remapped { "-remapped" } else { "" };
+        let folder = format!("{}-at-{}{mapped}", self.axes, self.bit_rate);
         let dir = cargo::workspace()
             .join("target")
             .join("networks")
@@ -147,9 +148,8 @@ impl Variant {
     fn shortest_cycle(&self, sample: &str, dir: &std::path::Path) -> Result<u32> {
         let text = self.describe(sample, u32::from(u16::MAX) / MS_US * MS_US);
         let name = dir.join(DESCRIPTION).display().to_string();
-        let outcome = read(&Source::new(name, text.as_bytes()), &mut |file| {
-            fs::read(file)
-        });
+        let source = Source::new(name, text.as_bytes());
+        let outcome = read_for_firmware(&source, &mut |file| fs::read(file));
         let machine = outcome.machine.as_ref();
         let bus = machine.and_then(|machine| machine.buses.first());
         let smallest = bus.and_then(|bus| bus.layout.demand.smallest_cycle());
@@ -248,7 +248,7 @@ mod tests {
             let text = variant.describe(&sample, cycle);
             let name = workspace.join(DESCRIPTION).display().to_string();
             let source = Source::new(name, text.as_bytes());
-            let outcome = read(&source, &mut |file| fs::read(file));
+            let outcome = read_for_firmware(&source, &mut |file| fs::read(file));
             assert!(outcome.problems.is_empty(), "{:?}", outcome.problems);
             let machine = outcome.machine.unwrap();
             assert_eq!(machine.nodes.len(), usize::from(variant.axes));

@@ -7,8 +7,8 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, bail};
 
 use crate::cargo;
-use crate::check::DESCRIPTION;
 use crate::cli::NewOptions;
+use crate::machine::DESCRIPTION;
 
 /// What the sample is made of, relative to the workspace.
 const FILES: [&str; 3] = [
@@ -28,8 +28,9 @@ pub(crate) fn command(options: &NewOptions) -> Result<ExitCode> {
     }
     copy(&options.dir)?;
     println!(
-        "{} is a machine like the sample. Change it, and let it be checked with\n\n    \
-         cargo xtask check {}",
+        "{} is a machine like the sample. Change it, let it be checked, and run it with\n\n    \
+         cargo xtask check {1}\n    \
+         cargo xtask run --network {1}",
         options.dir.display(),
         description.display()
     );

@@ -19,8 +19,9 @@ struct Report<'a> {
 }
 
 pub(crate) fn command(options: &SizeOptions) -> Result<ExitCode> {
-    let size = ImageSize::read(&Checked::read(options.machine.network.as_deref())?.build()?)?;
-    let budget = Budget::read()?;
+    let checked = Checked::read(options.machine.network.as_deref())?;
+    let size = ImageSize::read(&checked.build()?)?;
+    let budget = Budget::read()?.of(checked.axes());
     let exceeded = budget.exceeded_by(&size);
     if options.json {
         let report = Report {

@@ -1,5 +1,7 @@
 //! The commands as they are typed.
 
+use std::path::PathBuf;
+
 use assert_cmd::Command;
 use serde_json::Value;
 
@@ -65,6 +67,95 @@ fn a_machine_from_the_sample_is_all_right_until_it_is_broken() {
         words.contains("did you mean \"Target velocity\""),
         "{words}"
     );
+}
+
+fn stderr(assert: &assert_cmd::assert::Assert) -> String {
+    String::from_utf8_lossy(&assert.get_output().stderr).into_owned()
+}
+
+/// A machine from the sample with its text changed, in a folder of its own.
+fn machine(folder: &tempfile::TempDir, name: &str, change: impl Fn(String) -> String) -> PathBuf {
+    let dir = folder.path().join(name);
+    xtask().arg("new").arg(&dir).assert().code(0);
+    let file = dir.join("network.toml");
+    let text = std::fs::read_to_string(&file).unwrap();
+    std::fs::write(&file, change(text)).unwrap();
+    file
+}
+
+#[test]
+fn a_machine_that_cannot_work_is_refused_in_the_same_words_before_anything_is_built() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = machine(&folder, "refused", |text| {
+        text.replace("cycle_us = 10_000", "cycle_us = 4_000")
+            .replace("\"Statusword\", ", "\"Statusward\", ")
+    });
+    let checked = stderr(&xtask().arg("check").arg(&file).assert().code(1));
+    assert!(
+        checked.contains("network.toml:61: `Statusward`"),
+        "{checked}"
+    );
+    assert!(checked.ends_with("refused, 1 error\n"), "{checked}");
+    for command in ["run", "build", "size", "flash", "attach"] {
+        let assert = xtask()
+            .args([command, "--network"])
+            .arg(&file)
+            .env("PATH", "")
+            .assert()
+            .code(1);
+        assert_eq!(stderr(&assert), checked, "{command}");
+        assert!(assert.get_output().stdout.is_empty(), "{command}");
+    }
+}
+
+#[test]
+fn what_is_no_description_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let huge = folder.path().join("huge.toml");
+    std::fs::write(&huge, vec![b'#'; 17 << 20]).unwrap();
+    let missing = folder.path().join("missing.toml");
+    for (path, words) in [
+        (folder.path(), "the file cannot be read"),
+        (&missing, "the file cannot be read"),
+        (&huge, "too large"),
+    ] {
+        let refused = stderr(&xtask().arg("check").arg(path).assert().code(1));
+        assert!(refused.contains(words), "{refused}");
+        assert!(refused.contains("refused, 1 error"), "{refused}");
+    }
+}
+
+/// Other line ends, other node-IDs, fewer drives, another encoder, a gear and
+/// limits: what the sample's firmware would not know.
+#[test]
+fn a_machine_of_ones_own_is_built_and_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = machine(&folder, "own", |text| {
+        let (two, _) = text.split_once("[[node]]\nid = 3").unwrap();
+        two.replace("id = 2 ", "id = 99 ")
+            .replace("id = 2\n", "id = 99\n")
+            .replace("increments_per_turn = 2000", "increments_per_turn = 4096")
+            .replace("gear = [1, 1]", "gear = [5, 4]")
+            .replace("max_speed = 3_000 ", "max_speed = 600 ")
+            .replace("cycle_us = 10_000", "cycle_us = 8_000")
+            .replace('\n', "\r\n")
+    });
+    let assert = xtask()
+        .args(["run", "--json", "--network"])
+        .arg(&file)
+        .assert()
+        .code(0);
+    let object: Value = serde_json::from_slice(&assert.get_output().stdout).unwrap();
+    assert_eq!(object["result"], "ok");
+    let period = object["sync"]["period_us"].as_f64().unwrap();
+    // The board's crystal is not exact.
+    assert!((period - 8000.0).abs() < 2.0, "{period}");
+    let drives = object["drives"].as_array().unwrap();
+    let nodes: Vec<_> = drives.iter().map(|drive| &drive["node"]).collect();
+    assert_eq!(nodes, [1, 99]);
+    let arrivals = object["arrivals"].as_array().unwrap();
+    // 20 turns of the load.
+    assert_eq!(arrivals[0]["target"], 20 * 4096 * 5 / 4);
 }
 
 #[test]

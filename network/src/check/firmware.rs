@@ -4,7 +4,7 @@
 use toml::Spanned;
 
 use super::device;
-use crate::description::{Description, Node as Described};
+use crate::description::{Axis, Description, Node as Described};
 use crate::model::{Node, Pdo};
 use crate::object::{Address, Direction};
 use crate::resolve::Context;
@@ -16,6 +16,12 @@ const PDOS_MAX: u8 = 2;
 /// At every SYNC.
 const EVERY_SYNC: u8 = 1;
 const PROFILE_VELOCITY: u32 = 3;
+/// It holds positions to within a few increments.
+const INCREMENTS_MIN: u32 = 100;
+/// 606Ch carries 1 rpm of noise, and below 6 rpm an axis counts as standing.
+const SPEED_MIN: u32 = 60;
+/// The final approach of an axis at 3 rpm needs that much.
+const ACCELERATION_MIN: u32 = 100;
 const MODES_OF_OPERATION: Address = Address::new(0x6060, 0);
 
 /// What it writes in every cycle, and its bits.
@@ -69,6 +75,7 @@ fn motor(description: &Description, node: &Node, described: &Described, context:
             "add increments_per_turn to the axis of the device or of the node",
         );
     }
+    numbers(description, node, described, context);
     let mut modes = node
         .start_values
         .iter()
@@ -87,6 +94,60 @@ fn motor(description: &Description, node: &Node, described: &Described, context:
             "write mode = \"profile velocity\" in the axis",
         );
     }
+}
+
+/// What is too little to be led by.
+fn numbers(
+    description: &Description,
+    node: &Node,
+    described: &Described,
+    context: &mut Context<'_>,
+) {
+    let Some(motor) = node.motor() else {
+        return;
+    };
+    let of_device = device(description, described).map(|device| &device.axis);
+    let mut least =
+        |key: fn(&Axis) -> &Option<Spanned<i64>>, value: u32, least: u32, rule: &str| {
+            let own = key(&described.axis).as_ref();
+            let common = of_device.and_then(|axis| key(axis).as_ref());
+            if value < least {
+                let place = match own.or(common) {
+                    Some(number) => context.at(number),
+                    None => context.at(&described.device),
+                };
+                let help = format!("write at least {least}");
+                context.problems.error(&place, value, rule, help);
+            }
+        };
+    least(
+        |axis| &axis.increments_per_turn,
+        motor.increments_per_turn,
+        INCREMENTS_MIN,
+        "the firmware holds a position to within a few increments, and a turn has no more",
+    );
+    least(
+        |axis| &axis.max_speed,
+        motor.max_speed,
+        SPEED_MIN,
+        "the firmware takes an axis below 6 rpm as standing, and needs more speed to move it",
+    );
+    least(
+        |axis| &axis.max_acceleration,
+        motor.max_acceleration,
+        ACCELERATION_MIN,
+        "the firmware needs a steeper ramp to hold a position",
+    );
+    let (lower, upper) = motor.limits;
+    let room = upper.max(lower.saturating_neg());
+    // A quarter turn is kept free on either side.
+    let turns = motor.increments_per_turn + motor.increments_per_turn / 2;
+    least(
+        |axis| &axis.max_position,
+        u32::try_from(room).unwrap_or(0),
+        turns,
+        "the axis has no room for a turn from home and a quarter turn to spare",
+    );
 }
 
 fn pdos(direction: Direction, node: &Node, described: &Described, context: &mut Context<'_>) {

@@ -5,8 +5,6 @@ use std::fmt::Write;
 use crate::model::{Identity, Machine, Node, Pdo};
 use crate::object::Address;
 
-const MS_US: u32 = 1000;
-
 /// The description of the first bus as constants of the library that `library`
 /// names: `crate` within it, `canmaster` outside.
 ///
@@ -54,18 +52,22 @@ fn write(machine: &Machine, library: &str, out: &mut String) -> std::fmt::Result
     )?;
     writeln!(
         out,
-        "/// The shortest SYNC period (1006h) that the cycle's frames fit into, us."
+        "/// The SYNC periods (1006h) that pass the check of the description, us."
     )?;
-    let whole = bus.tpdo_deadline_us + bus.layout.after_tpdos_us();
-    let smallest = bus.layout.demand.smallest_cycle().unwrap_or(bus.cycle_us);
-    let shortest = smallest.max(whole);
+    let (shortest, longest) = bus.cycles().into_inner();
     writeln!(out, "pub const SHORTEST_CYCLE_US: u32 = {shortest};")?;
+    writeln!(out, "pub const LONGEST_CYCLE_US: u32 = {longest};")?;
     writeln!(
         out,
-        "/// From the first RPDO of a cycle to the end of the last, in whole milliseconds, us."
+        "/// From the last TPDO of a cycle to its first RPDO, us."
     )?;
-    let rpdos = bus.layout.after_tpdos_us() - bus.layout.demand.compute_us;
-    let rpdos = rpdos.next_multiple_of(MS_US);
+    let compute = bus.layout.demand.compute_us;
+    writeln!(out, "pub const COMPUTE_US: u16 = {compute};")?;
+    writeln!(
+        out,
+        "/// From the first RPDO of a cycle to the end of the last and the guard, us."
+    )?;
+    let rpdos = bus.layout.after_tpdos_us() - compute;
     writeln!(out, "pub const RPDOS_US: u16 = {rpdos};")?;
     writeln!(
         out,
@@ -122,7 +124,7 @@ fn motors(machine: &Machine, out: &mut String) -> std::fmt::Result {
         writeln!(out, "        gear: ({motor_turns}, {load_turns}),")?;
         writeln!(out, "        max_speed: {},", motor.max_speed)?;
         writeln!(out, "        max_acceleration: {},", motor.max_acceleration)?;
-        writeln!(out, "        max_travel: {},\n    }},", motor.max_travel)?;
+        writeln!(out, "        limits: {:?},\n    }},", motor.limits)?;
     }
     writeln!(out, "];\n")
 }

@@ -61,8 +61,10 @@ const MODES: [Mode; 9] = [
 const MICRO: i128 = 6;
 /// 60C2h:02 unless told otherwise: milliseconds.
 const MILLI: i128 = -3;
-/// Increments and turns of a machine.
-const COUNT_MAX: i64 = u32::MAX as i64;
+/// Increments that a turn may have: an encoder of 24 bits.
+const INCREMENTS_MAX: i64 = 1 << 24;
+/// Turns of either side of a gear.
+const TURNS: std::ops::RangeInclusive<i64> = 1..=1_000_000;
 
 /// What an axis is and what is written for it.
 pub(super) struct Resolved {
@@ -151,7 +153,8 @@ pub(super) fn resolve(
     }
     positions(axis, context);
     let increments = axis.increments_per_turn.as_ref();
-    let increments_per_turn = context.optional(increments, "increments_per_turn", 1..=COUNT_MAX);
+    let increments_per_turn =
+        context.optional(increments, "increments_per_turn", 1..=INCREMENTS_MAX);
     let gear = gear(axis.gear.as_ref(), context);
     writer.complete.then_some(Resolved {
         increments_per_turn,
@@ -391,6 +394,18 @@ fn positions(axis: &Axis, context: &mut Context<'_>) {
             "exchange the two, or leave both out for an axis without limits",
         );
     }
+    let (only, key, other) = match (&axis.min_position, &axis.max_position) {
+        (Some(only), None) => (only, "min_position", "max_position"),
+        (None, Some(only)) => (only, "max_position", "min_position"),
+        _ => return,
+    };
+    let place = context.at(only);
+    context.problems.error(
+        &place,
+        only.get_ref(),
+        format!("with {key} alone nobody knows how far the axis may go the other way"),
+        format!("add {other}, or leave both out for an axis without limits"),
+    );
 }
 
 fn gear(gear: Option<&Spanned<Vec<i64>>>, context: &mut Context<'_>) -> Option<(u32, u32)> {
@@ -398,17 +413,19 @@ fn gear(gear: Option<&Spanned<Vec<i64>>>, context: &mut Context<'_>) -> Option<(
         return Some((1, 1));
     };
     if let [motor, load] = spanned.get_ref()[..]
-        && let (Ok(motor), Ok(load)) = (u32::try_from(motor), u32::try_from(load))
-        && motor > 0
-        && load > 0
+        && TURNS.contains(&motor)
+        && TURNS.contains(&load)
     {
-        return Some((motor, load));
+        return Some((motor as u32, load as u32));
     }
     let place = context.at(spanned);
     context.problems.error(
         &place,
         format!("{:?}", spanned.get_ref()),
-        "a gear is two whole numbers above 0: turns of the motor for turns of the load",
+        format!(
+            "a gear is two whole numbers of 1 ..= {}: turns of the motor for turns of the load",
+            TURNS.end()
+        ),
         "write [1, 1] for no gear, or for example [81, 7]",
     );
     None

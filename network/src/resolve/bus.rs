@@ -11,9 +11,9 @@ use crate::problem::nearest;
 use crate::timing::{BIT_RATES, BitTiming, CLOCK_HZ, SAMPLE_POINT, sample_point_limits};
 
 /// Shortest cycle that the timers and the tasks of the firmware are made for.
-const CYCLE_MIN_US: i64 = 500;
+pub(crate) const CYCLE_MIN_US: i64 = 500;
 /// What the sixteen bits of the deadline's timer count.
-const CYCLE_MAX_US: i64 = u16::MAX as i64;
+pub(crate) const CYCLE_MAX_US: i64 = u16::MAX as i64;
 /// Controllers that the firmware drives.
 const PERIPHERALS: [(&str, u8); 1] = [("FDCAN1", 1)];
 /// From the last TPDO to the first RPDO, as measured with room to spare.

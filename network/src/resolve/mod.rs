@@ -8,6 +8,7 @@ mod find;
 mod pdo;
 mod value;
 
+pub(crate) use bus::{CYCLE_MAX_US, CYCLE_MIN_US};
 pub(crate) use context::Context;
 
 use std::collections::BTreeMap;

@@ -11,10 +11,13 @@ pub const AXES: usize = 6;
 pub const TPDO_DEADLINE_US: u16 = 5000;
 /// Cycles in a row without a TPDO after which its node counts as lost.
 pub const TPDO_MISSING_LIMIT: u8 = 3;
-/// The shortest SYNC period (1006h) that the cycle's frames fit into, us.
+/// The SYNC periods (1006h) that pass the check of the description, us.
 pub const SHORTEST_CYCLE_US: u32 = 6835;
-/// From the first RPDO of a cycle to the end of the last, in whole milliseconds, us.
-pub const RPDOS_US: u16 = 2000;
+pub const LONGEST_CYCLE_US: u32 = 65535;
+/// From the last TPDO of a cycle to its first RPDO, us.
+pub const COMPUTE_US: u16 = 200;
+/// From the first RPDO of a cycle to the end of the last and the guard, us.
+pub const RPDOS_US: u16 = 1635;
 /// Prescaler, segment 1 and segment 2 of the bit timing.
 pub const BIT_TIMING: (u16, u16, u16) = (1, 20, 3);
 
@@ -25,42 +28,42 @@ pub const MOTORS: [Motor; AXES] = [
         gear: (1, 1),
         max_speed: 3000,
         max_acceleration: 20000,
-        max_travel: 2147483647,
+        limits: (-2147483647, 2147483647),
     },
     Motor {
         increments_per_turn: 2000,
         gear: (1, 1),
         max_speed: 3000,
         max_acceleration: 20000,
-        max_travel: 2147483647,
+        limits: (-2147483647, 2147483647),
     },
     Motor {
         increments_per_turn: 2000,
         gear: (1, 1),
         max_speed: 3000,
         max_acceleration: 20000,
-        max_travel: 2147483647,
+        limits: (-2147483647, 2147483647),
     },
     Motor {
         increments_per_turn: 2000,
         gear: (1, 1),
         max_speed: 3000,
         max_acceleration: 20000,
-        max_travel: 2147483647,
+        limits: (-2147483647, 2147483647),
     },
     Motor {
         increments_per_turn: 2000,
         gear: (1, 1),
         max_speed: 3000,
         max_acceleration: 20000,
-        max_travel: 2147483647,
+        limits: (-2147483647, 2147483647),
     },
     Motor {
         increments_per_turn: 2000,
         gear: (1, 1),
         max_speed: 3000,
         max_acceleration: 20000,
-        max_travel: 2147483647,
+        limits: (-2147483647, 2147483647),
     },
 ];
 

@@ -207,7 +207,7 @@ fn motor(node: &model::Node) -> Option<Motor> {
         gear: motor.gear,
         max_speed: motor.max_speed,
         max_acceleration: motor.max_acceleration,
-        max_travel: motor.max_travel,
+        limits: motor.limits,
     })
 }
 
@@ -361,6 +361,37 @@ mod tests {
         }
         assert!(program(&[], Duration::from_millis(10)).is_none());
         assert!(program(&[Motor::SAMPLE; 17], Duration::from_millis(10)).is_none());
+    }
+
+    #[test]
+    fn the_program_keeps_within_the_limits_of_the_axis() {
+        let targets = |motor: Motor| -> Vec<i32> {
+            let (moves, round_trip) = program(&[motor; 6], Duration::from_millis(10)).unwrap();
+            assert!(round_trip.is_some());
+            moves[0].iter().map(|part| part.unwrap().target).collect()
+        };
+        let limited = |limits| {
+            targets(Motor {
+                limits,
+                ..Motor::SAMPLE
+            })
+        };
+        let far = [40_000, -32_000, 40_000, -32_000, 60_000, 60_000];
+        assert_eq!(limited((-i32::MAX, i32::MAX)), far);
+        // A quarter turn of 2000 before the limit.
+        assert_eq!(
+            limited((-10_500, 50_500)),
+            [40_000, 32_000, 40_000, 32_000, 50_000, 50_000]
+        );
+        assert_eq!(
+            limited((-100_000, 0)),
+            [-40_000, -32_000, -40_000, -32_000, -60_000, -60_000]
+        );
+        let geared = targets(Motor {
+            gear: (3, 2),
+            ..Motor::SAMPLE
+        });
+        assert_eq!(geared, far.map(|target| target / 2 * 3));
     }
 
     #[test]

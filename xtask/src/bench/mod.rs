@@ -6,16 +6,14 @@ mod startup;
 
 use std::process::ExitCode;
 
-use anyhow::{Context, Result};
-use canmaster_sim::world::Image;
+use anyhow::Result;
 use serde::Serialize;
 
 use crate::cli::{Bench, BenchOptions};
-use crate::firmware;
+use crate::machine::Checked;
 
 pub(crate) fn command(options: &BenchOptions) -> Result<ExitCode> {
-    eprintln!("Building the firmware.");
-    let image = Image::read(&firmware::build()?).context("the firmware image cannot be run")?;
+    let image = Checked::read(None)?.built()?;
     let outcome = match options.bench {
         Bench::Startup => startup::run(&image, options.seed)?,
         Bench::Sdo => sdo::run(&image, options.seed)?,

@@ -6,15 +6,15 @@ mod pool;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use canmaster_sim::time::Time;
-use canmaster_sim::world::Image;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
 use crate::cli::CampaignOptions;
+use crate::machine::Checked;
 use crate::networks::{self, Variant};
-use crate::{firmware, table};
+use crate::table;
 use job::{Job, Row};
 
 /// The JSON object.
@@ -28,8 +28,7 @@ struct Report {
 }
 
 pub(crate) fn command(options: &CampaignOptions) -> Result<ExitCode> {
-    eprintln!("Building the firmware.");
-    let image = Image::read(&firmware::build()?).context("the firmware image cannot be run")?;
+    let image = Checked::read(None)?.built()?;
     let end = Time::from_secs_f64(options.seconds);
     let jobs: Vec<Job> = (1..=options.seeds)
         .flat_map(|seed| Job::all(seed, end))

@@ -1,0 +1,72 @@
+//! The SYNC periods that the firmware takes for 1006h are those that the check of the
+//! description lets through.
+
+use std::ops::RangeInclusive;
+use std::path::Path;
+
+use canmaster_network::{Source, read_for_firmware};
+
+/// The sample with other lines; the cycles of its bus. `None`: it is refused.
+fn cycles(changes: &[(&str, &str)]) -> Option<RangeInclusive<u32>> {
+    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let mut text = std::fs::read_to_string(workspace.join("network.toml")).unwrap();
+    for (from, to) in changes {
+        assert!(text.contains(from), "{from}");
+        text = text.replace(from, to);
+    }
+    let source = Source::new("network.toml", text.as_bytes());
+    let outcome = read_for_firmware(&source, &mut |file| std::fs::read(workspace.join(file)));
+    Some(outcome.machine?.buses[0].cycles())
+}
+
+/// Whether the check takes exactly the cycles of `range` near its ends.
+fn agrees(range: &RangeInclusive<u32>, changes: &[(&str, &str)]) {
+    let (shortest, longest) = (*range.start(), *range.end());
+    for (cycle, taken) in [
+        (shortest - 1, false),
+        (shortest, true),
+        (shortest + (longest - shortest) / 3, true),
+        (longest, true),
+        (longest + 1, false),
+    ] {
+        let line = format!("cycle_us = {cycle}");
+        let mut changes = changes.to_vec();
+        changes.push(("cycle_us = 10_000", &line));
+        let found = cycles(&changes);
+        assert_eq!(found.is_some(), taken, "{cycle}");
+        // From wherever one looks.
+        assert!(found.is_none_or(|found| found == *range), "{cycle}");
+    }
+}
+
+#[test]
+fn the_sample_may_go_down_to_its_deadline_and_what_comes_after_it() {
+    let range = cycles(&[]).unwrap();
+    // Deadline, computation, RPDOs, guard; and what the timer counts.
+    assert_eq!(range, 5_000 + 200 + 1_500 + 135..=65_535);
+    agrees(&range, &[]);
+}
+
+#[test]
+fn an_earlier_deadline_allows_a_shorter_cycle_until_the_frames_do_not_fit() {
+    let early = [("tpdo_deadline_us = 5_000", "tpdo_deadline_us = 3_160")];
+    let range = cycles(&early).unwrap();
+    // As laid out: `cargo xtask check` shows it. Beyond 50 ms the master sends two
+    // heartbeats.
+    assert_eq!(range, 3_160 + 1_835..=50_000);
+    agrees(&range, &early);
+    let limited = [early[0], ("load_limit = 90", "load_limit = 50")];
+    // 3660 bits may take half of the cycle.
+    assert_eq!(cycles(&limited).unwrap(), 7_320..=50_000);
+    agrees(&cycles(&limited).unwrap(), &limited);
+}
+
+#[test]
+fn a_cycle_in_which_more_heartbeats_come_late_is_no_longer_taken() {
+    // All TPDOs, heartbeats and SDO are in at 3160 us; with the master's heartbeat
+    // twice, beyond 50 ms, at 3225 us.
+    let tight = [("tpdo_deadline_us = 5_000", "tpdo_deadline_us = 3_200")];
+    let range = cycles(&tight).unwrap();
+    assert_eq!(range, 5_035..=50_000);
+    agrees(&range, &tight);
+}
