@@ -191,12 +191,16 @@ pub(crate) struct CapacityOptions {
 
 #[derive(Args, Clone, Debug)]
 pub(crate) struct CampaignOptions {
-    /// How many seeds, from 1 on
-    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..=10_000))]
-    pub(crate) seeds: u64,
+    /// How many seeds, from 1 on [default: 20; with --faults 200]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    pub(crate) seeds: Option<u64>,
     /// Simulated seconds of each
     #[arg(long, value_name = "S", default_value = "60", value_parser = seconds)]
     pub(crate) seconds: f64,
+    /// Instead: a random fault at a random moment with each seed, judged by the
+    /// contract for faults
+    #[arg(long, conflicts_with = "seconds")]
+    pub(crate) faults: bool,
     /// Runs at the same time [default: one per core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1024))]
     pub(crate) jobs: Option<u64>,
@@ -225,6 +229,8 @@ pub(crate) enum Bench {
     Startup,
     /// How fast data goes to and from a drive by SDO
     Sdo,
+    /// How many cycles the steps of the axes take, in each mode
+    Motion,
 }
 
 /// Severities as they are typed.

@@ -129,6 +129,16 @@ impl Axis {
         self.servo.set_load(permille);
     }
 
+    /// Something blocks the shaft, or lets it go.
+    pub(super) fn block(&mut self, blocked: bool) {
+        self.servo.block(blocked);
+    }
+
+    /// The power stage goes off by itself.
+    pub(super) fn drop_out(&mut self) {
+        self.machine.drop_out();
+    }
+
     /// Whether a control cycle can end in an error by itself.
     pub(super) fn may_fail(&self, od: &Dictionary) -> bool {
         let has_switches = self.servo.travel().has_limit_switch();

@@ -263,6 +263,15 @@ impl Machine {
         self.leaving = ramp.filter(|_| powered).map(|ramp| Leaving { to, ramp });
     }
 
+    /// The power stage loses its voltage or its enabling input: no error, but the
+    /// axis has no torque any more (transitions 7, 9, 10 and 12).
+    pub fn drop_out(&mut self) {
+        use State::{OperationEnabled, QuickStopActive, ReadyToSwitchOn, SwitchedOn};
+        if let ReadyToSwitchOn | SwitchedOn | OperationEnabled | QuickStopActive = self.state {
+            self.go(State::SwitchOnDisabled);
+        }
+    }
+
     /// Communication ends in an orderly way: NMT takes the drive out of
     /// operational, or resets it. The axis acts as 6007h says, without fault.
     pub fn connection_ends(&mut self, options: Options) {

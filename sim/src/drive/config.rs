@@ -1,5 +1,6 @@
 //! What one simulated drive is like, and what is wrong with it.
 
+use super::cia402::State;
 use super::mangle::SdoWrong;
 use super::plant::PlantConfig;
 use super::random::{self, Random};
@@ -195,6 +196,13 @@ pub enum DriveFault {
     },
     /// Controlwords act this much later.
     ControlwordLate(Spread),
+    /// Something is wrong in one state of CiA 402, each time that it is entered.
+    InState {
+        /// The state.
+        state: State,
+        /// What.
+        what: Trouble,
+    },
     /// From then on 6061h does not follow 6060h.
     ModeStuck {
         /// Since when.
@@ -231,6 +239,13 @@ pub enum DriveFault {
         /// direction.
         permille: i32,
     },
+    /// The shaft does not turn, whatever the torque: something blocks the axis.
+    Blocked {
+        /// Since when.
+        at: Time,
+        /// Until when; `None`: for ever.
+        until: Option<Time>,
+    },
     /// Safe torque off: no torque, 8A88h, and no reset as long as it lasts.
     Sto {
         /// Since when.
@@ -247,5 +262,32 @@ pub enum DriveFault {
         /// Until when its cause lasts; before, a fault reset is in vain.
         /// `None`: the cause is gone at once.
         until: Option<Time>,
+    },
+}
+
+/// What is wrong with a drive in one state of CiA 402.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Trouble {
+    /// Controlwords change nothing there: the next state is never confirmed.
+    Deaf,
+    /// Controlwords act this much later there.
+    Slow(Spread),
+    /// It does not stay there: the power stage loses its voltage or its enabling
+    /// input, which is no error (CiA 402-2, transitions 7, 9, 10 and 12).
+    DropsOut {
+        /// So long after entering, microseconds.
+        after_us: u64,
+    },
+    /// An error occurs there.
+    Error {
+        /// So long after entering, microseconds.
+        after_us: u64,
+        /// Its code.
+        code: u16,
+    },
+    /// The supply fails there.
+    PowerLoss {
+        /// So long after entering, microseconds.
+        after_us: u64,
     },
 }

@@ -1,6 +1,6 @@
 //! Power-on, resets and the way back (CiA 301, 7.3.2.2.1).
 
-use super::config::DriveFault;
+use super::config::{DriveFault, Trouble};
 use super::guarding::Guarding;
 use super::network::Watch;
 use super::service::SdoService;
@@ -149,11 +149,16 @@ impl Drive {
             DriveFault::ControlwordIgnored { at } => self.now >= at,
             _ => false,
         };
-        if self.config.faults.iter().any(since) {
+        let deaf = self.troubles().any(|trouble| trouble == Trouble::Deaf);
+        if deaf || self.config.faults.iter().any(since) {
             return;
         }
         let word = self.od.number(0x6040, 0) as u16;
-        match self.control_delay {
+        let slow = self.troubles().find_map(|trouble| match trouble {
+            Trouble::Slow(delay) => Some(delay),
+            _ => None,
+        });
+        match slow.or(self.control_delay) {
             Some(delay) => {
                 let us = delay.draw(&mut self.random);
                 self.plan(self.now + self.clock.span(us), Job::Control(word));
@@ -167,5 +172,6 @@ impl Drive {
         if self.axis.control(word, &self.od) && self.od.errors.reset() {
             self.send_emcy(0);
         }
+        self.watch_state();
     }
 }

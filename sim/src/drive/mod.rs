@@ -45,7 +45,7 @@ pub mod test_data;
 mod tests;
 pub mod travel;
 
-pub use config::{DriveConfig, DriveFault, Identity, Spread};
+pub use config::{DriveConfig, DriveFault, Identity, Spread, Trouble};
 pub use mangle::SdoWrong;
 pub use plant::PlantState;
 pub use status::{DriveStatus, Sample};
@@ -99,6 +99,10 @@ enum Job {
     StickMode,
     /// Another load on the shaft, per mille of rated torque.
     Load(i32),
+    /// Something blocks the shaft, or lets it go.
+    Block(bool),
+    /// The power stage goes off in this state.
+    DropOut(cia402::State),
     /// An error of the configuration occurs.
     Error { code: u16, lasting: bool },
     /// Its cause is gone.
@@ -131,6 +135,8 @@ pub struct Drive {
     /// bit/s, in use.
     bit_rate: u32,
     control_delay: Option<Spread>,
+    /// State of CiA 402 whose entering was seen.
+    watched_state: cia402::State,
     bus_off: bool,
     controller: Controller,
     od: Dictionary,
@@ -168,6 +174,7 @@ impl Drive {
             guarding: Guarding::default(),
             bit_rate: config.bit_rate,
             control_delay: None,
+            watched_state: cia402::State::NotReadyToSwitchOn,
             bus_off: false,
             controller: Controller::default(),
             od,
@@ -295,6 +302,8 @@ impl Drive {
             Job::Control(word) => self.control(word),
             Job::StickMode => self.axis.stick_mode(),
             Job::Load(permille) => self.axis.set_load(permille.into()),
+            Job::Block(blocked) => self.axis.block(blocked),
+            Job::DropOut(state) => self.drop_out(state),
             Job::Error { code, lasting } => self.raise(code, lasting),
             Job::CauseGone(code) => self.cause_gone(code),
         }
@@ -326,6 +335,7 @@ impl Drive {
                 self.finish_reset();
             }
         }
+        self.watch_state();
         self.observe();
     }
 
@@ -333,6 +343,7 @@ impl Drive {
     fn watched_cycle(&self) -> bool {
         matches!(self.life, Life::Resetting)
             || self.axis.may_fail(&self.od)
+            || self.has_troubles()
             || (self.nmt.allows(NmtService::Pdo) && self.exchange.has_events())
     }
 

@@ -77,6 +77,7 @@ pub struct Plant {
     config: PlantConfig,
     state: PlantState,
     disturbance: f64,
+    blocked: bool,
     random: Random,
 }
 
@@ -90,6 +91,7 @@ impl Plant {
                 ..PlantState::default()
             },
             disturbance: 0.0,
+            blocked: false,
             random,
         }
     }
@@ -114,6 +116,11 @@ impl Plant {
         self.config.load_permille = permille;
     }
 
+    /// Something blocks the shaft, or lets it go.
+    pub fn block(&mut self, blocked: bool) {
+        self.blocked = blocked;
+    }
+
     /// One control cycle of `seconds` true time with constant motor torque.
     pub fn step(&mut self, torque: f64, seconds: f64) {
         self.disturb(seconds);
@@ -126,6 +133,10 @@ impl Plant {
     }
 
     fn sub_step(&mut self, driving: f64, dt: f64) {
+        if self.blocked {
+            self.state.velocity_rpm = 0.0;
+            return;
+        }
         let speed = self.state.velocity_rpm;
         let friction = self.config.friction_permille / 1000.0;
         let next = if speed == 0.0 {
@@ -187,6 +198,23 @@ mod tests {
         }
         assert_eq!(p.state().position_inc, 0.0);
         assert_eq!(p.state().velocity_rpm, 0.0);
+    }
+
+    #[test]
+    fn a_blocked_shaft_does_not_turn() {
+        let mut p = plant(PlantConfig::default());
+        for _ in 0..100 {
+            p.step(1.0, 0.0004);
+        }
+        p.block(true);
+        let at = p.state().position_inc;
+        for _ in 0..100 {
+            p.step(2.0, 0.0004);
+        }
+        assert_eq!((p.state().position_inc, p.state().velocity_rpm), (at, 0.0));
+        p.block(false);
+        p.step(1.0, 0.0004);
+        assert!(p.state().velocity_rpm > 0.0);
     }
 
     #[test]

@@ -148,6 +148,11 @@ impl Servo {
         self.plant.set_load(permille);
     }
 
+    /// Something blocks the shaft, or lets it go.
+    pub fn block(&mut self, blocked: bool) {
+        self.plant.block(blocked);
+    }
+
     /// Increments per second and rpm.
     pub fn per_rpm(&self) -> f64 {
         f64::from(self.plant.config().increments_per_turn) / SECONDS_PER_MINUTE

@@ -4,6 +4,8 @@
 pub mod arrivals;
 pub mod axis;
 pub mod bus;
+pub mod contract;
+pub mod coordination;
 pub mod grid;
 pub mod lss;
 pub mod sdo;
@@ -13,5 +15,7 @@ pub mod verdict;
 pub use arrivals::{Arrival, Assignment, Part, Release, arrivals, worst_pair};
 pub use axis::{AxisMonitor, Movement, STANDSTILL_RPM, TracePoint};
 pub use bus::{BusFigures, Traffic};
+pub use contract::{Cause, Limit, Limits, Reaction};
+pub use coordination::{Edge, Span};
 pub use lss::LssFigures;
 pub use verdict::{ARRIVAL_TOLERANCE, Evidence, Outcome, Verdict, verdict};

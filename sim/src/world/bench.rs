@@ -13,15 +13,18 @@ use crate::time::Time;
 impl World<'_> {
     /// Does something to the machine now.
     pub fn apply(&mut self, stimulus: Stimulus) {
+        if let Some(words) = stimulus.harm() {
+            self.marks.push((self.now, words));
+        }
         match stimulus {
             Stimulus::Button(pressed) => self.board.set_button(pressed),
             Stimulus::Reset(true) => {
-                self.watch.revoke();
+                self.watch.revoke(self.now + watch::LAST_COMMAND);
                 self.decoder.restart();
                 self.board.hold_in_reset();
             }
             Stimulus::Power(false) => {
-                self.watch.revoke();
+                self.watch.revoke(self.now + watch::LAST_COMMAND);
                 self.decoder.restart();
                 self.board.power_off();
             }
@@ -53,7 +56,7 @@ impl World<'_> {
         if self.watch.ready() {
             self.watch.release(self.now);
         } else {
-            self.watch.revoke();
+            self.watch.revoke(self.now + watch::LAST_COMMAND);
         }
         let mut presses = Vec::new();
         self.operator.press(self.now, &mut presses);
@@ -172,6 +175,11 @@ impl World<'_> {
     /// Where the board is on the first bus.
     pub fn board_port(&self) -> PortId {
         self.lines[FIRST].board
+    }
+
+    /// The board measures anew from now on.
+    pub fn clear_stats(&mut self) {
+        self.board.clear_stats();
     }
 
     /// The emulated board.

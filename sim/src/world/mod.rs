@@ -13,6 +13,7 @@ mod scenario;
 mod station;
 mod steps;
 mod stimulus;
+pub mod strike;
 mod tool;
 pub mod trials;
 mod watch;
@@ -23,7 +24,7 @@ pub use machine::{Machine, MachineError, Segment, sample};
 pub use record::{AxisRecord, BusRecord, Record};
 pub use scenario::{Ailment, Scenario};
 pub use stimulus::Stimulus;
-pub use watch::Startup;
+pub use watch::{AxisState, Startup};
 
 use canmaster::nmt;
 use rand::{Rng, SeedableRng};
@@ -95,6 +96,8 @@ pub struct World<'i> {
     complained: Option<Time>,
     halted: Option<String>,
     in_motion: Vec<Stimulus>,
+    /// What was done to the machine, for a picture.
+    marks: Vec<(Time, String)>,
     events: Vec<Event>,
     rtt: Vec<u8>,
     told: Vec<LogLine>,
@@ -158,6 +161,7 @@ impl<'i> World<'i> {
             log: Vec::new(),
             complained: None,
             halted: None,
+            marks: Vec::new(),
             events: Vec::new(),
             rtt: Vec::new(),
             told: Vec::new(),
@@ -214,10 +218,12 @@ impl<'i> World<'i> {
             .nodes
             .iter()
             .zip(self.stations.iter().zip(self.watch.axes))
-            .map(|(node, (station, motion))| AxisRecord {
+            .zip(self.watch.states)
+            .map(|((node, (station, motion)), states)| AxisRecord {
                 node: node.id,
                 status: station.as_ref().map(|station| station.drive.status()),
                 motion,
+                states,
             })
             .collect();
         Seen {
@@ -229,6 +235,7 @@ impl<'i> World<'i> {
             axes,
             releases: self.watch.releases,
             startup: self.watch.startup,
+            marks: self.marks,
             board: self.board.stats(),
             complaints,
             unfinished,

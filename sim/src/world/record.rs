@@ -4,13 +4,13 @@ use canmaster::NodeId;
 
 use super::Machine;
 use super::line::Line;
-use super::watch::Startup;
+use super::watch::{AxisState, Startup};
 use crate::board::BoardStats;
 use crate::bus::{PortId, WireRecord};
 use crate::drive::DriveStatus;
 use crate::judge::{
-    Arrival, Assignment, AxisMonitor, BusFigures, Evidence, LssFigures, Release, Verdict, arrivals,
-    bus, lss, skew::skew_us, verdict,
+    Arrival, Assignment, AxisMonitor, BusFigures, Evidence, LssFigures, Release, Span, Verdict,
+    arrivals, bus, coordination, lss, skew::skew_us, verdict,
 };
 use crate::log::LogLine;
 use crate::time::Time;
@@ -24,6 +24,8 @@ pub struct AxisRecord {
     pub status: Option<DriveStatus>,
     /// What it did.
     pub motion: AxisMonitor,
+    /// What its drive was in, from change to change.
+    pub states: Vec<AxisState>,
 }
 
 /// One bus at the end of a run.
@@ -53,6 +55,7 @@ pub(super) struct Seen {
     pub(super) axes: Vec<AxisRecord>,
     pub(super) releases: Vec<Release>,
     pub(super) startup: Startup,
+    pub(super) marks: Vec<(Time, String)>,
     pub(super) board: BoardStats,
     pub(super) complaints: Vec<String>,
     pub(super) unfinished: String,
@@ -79,6 +82,10 @@ pub struct Record {
     pub arrivals: Vec<Arrival>,
     /// When the machine got ready.
     pub startup: Startup,
+    /// What was done to the machine, and when: faults, resets.
+    pub marks: Vec<(Time, String)>,
+    /// In which SYNC each axis was told to start, and to move for the last time.
+    pub spans: Vec<Span>,
     /// The search for drives without node-ID, if there was one.
     pub lss: Option<LssFigures>,
     /// Figures of all buses together.
@@ -118,6 +125,10 @@ impl Seen {
             .collect();
         let figures = BusFigures::together(buses.iter().map(|bus| &bus.figures));
         let syncs: Vec<_> = buses.iter().map(|bus| bus::syncs(&bus.wire)).collect();
+        let spans = coordination::spans(
+            buses.iter().map(|bus| &bus.wire[..]),
+            self.machine.network(),
+        );
         let arrived = arrivals(&nodes, &motion, assignment, &self.releases);
         let error_line = first_error(&self.log).map(|line| line.message.as_str());
         let verdict = verdict(&Evidence {
@@ -135,6 +146,7 @@ impl Seen {
         Record {
             lss: buses.iter().find_map(|bus| lss::judge(&bus.wire)),
             skew_us: skew_us(&syncs, assignment.cycle),
+            spans,
             seed: self.seed,
             simulated: self.simulated,
             machine: self.machine,
@@ -144,6 +156,7 @@ impl Seen {
             releases: self.releases,
             arrivals: arrived,
             startup: self.startup,
+            marks: self.marks,
             bus: figures,
             board: self.board,
             complaints: self.complaints,

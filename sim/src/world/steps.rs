@@ -4,7 +4,7 @@
 use super::line::{Line, Who};
 use super::operator::View;
 use super::station::Station;
-use super::watch::AxisTruth;
+use super::watch::{AxisTruth, LAST_COMMAND};
 use super::{FIRST, Observer, World, enabled, operational};
 use crate::board::Stop;
 use crate::drive::Drive;
@@ -149,7 +149,7 @@ impl World<'_> {
             observer.log(self.now, &line);
             if line.level == Some(Level::Error) && self.complained.is_none() {
                 self.complained = Some(self.now);
-                self.watch.revoke();
+                self.watch.revoke(self.now + LAST_COMMAND);
             }
             self.log.push((self.now, line));
         }
@@ -200,5 +200,7 @@ fn axis_truth(drive: &Drive) -> AxisTruth {
         velocity: truth.velocity_rpm,
         operational: operational(&status),
         enabled: enabled(&status),
+        state: status.state,
+        mode: status.mode,
     }
 }

@@ -51,6 +51,44 @@ pub enum Stimulus {
     Bus(BusFault),
 }
 
+impl Stimulus {
+    /// What it does to the machine, in a few words, if it does harm.
+    pub(super) fn harm(&self) -> Option<String> {
+        Some(match self {
+            Stimulus::Button(_)
+            | Stimulus::Reset(false)
+            | Stimulus::Power(true)
+            | Stimulus::DelayIrq { .. } => return None,
+            Stimulus::Reset(true) => "board reset".into(),
+            Stimulus::Power(false) => "board without supply".into(),
+            Stimulus::Hang { irq } => format!("interrupt {irq} hangs"),
+            Stimulus::Spin { irq } => format!("interrupt {irq} never ends"),
+            Stimulus::Silence { node } => format!("node {} silent", node.get()),
+            Stimulus::Drive { node, fault } => {
+                format!("node {}: {}", node.get(), words(fault))
+            }
+            Stimulus::Bus(BusFault::Cut { .. }) => "cable cut".into(),
+            Stimulus::Bus(BusFault::StuckDominant { .. }) => "short circuit".into(),
+            Stimulus::Bus(BusFault::FlipBit { .. } | BusFault::BitErrors { .. }) => {
+                "bit errors".into()
+            }
+        })
+    }
+}
+
+fn words(fault: &DriveFault) -> String {
+    match fault {
+        DriveFault::HeartbeatLost { .. } => "heartbeat lost".into(),
+        DriveFault::TpdosLost { .. } => "TPDOs lost".into(),
+        DriveFault::PowerLoss { .. } | DriveFault::PowerCycle { .. } => "supply lost".into(),
+        DriveFault::Load { permille, .. } => format!("load of {permille} per mille"),
+        DriveFault::Blocked { .. } => "blocked".into(),
+        DriveFault::Sto { .. } => "safe torque off".into(),
+        DriveFault::Error { code, .. } => format!("error {code:04X}h"),
+        _ => "fault".into(),
+    }
+}
+
 /// What is still to be done, in the order of time and then of asking.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Agenda {
@@ -81,6 +119,17 @@ impl Agenda {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn harm_is_told_and_the_operator_does_none() {
+        assert_eq!(Stimulus::Button(true).harm(), None);
+        assert_eq!(Stimulus::Reset(true).harm().unwrap(), "board reset");
+        let node = NodeId::constant::<4>();
+        let (at, code, until) = (Time::ZERO, 0x2310, None);
+        let fault = DriveFault::Error { at, code, until };
+        let harm = Stimulus::Drive { node, fault }.harm();
+        assert_eq!(harm.unwrap(), "node 4: error 2310h");
+    }
 
     #[test]
     fn equal_moments_keep_their_order() {

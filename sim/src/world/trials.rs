@@ -1,5 +1,6 @@
 //! What must not happen to a machine in motion, done to it.
 
+use super::watch::LAST_COMMAND;
 use super::{Image, Scenario, Stimulus, World, enabled};
 use crate::board::BoardError;
 use crate::judge::Release;
@@ -73,7 +74,7 @@ fn watchdog_in_motion(image: &Image, seed: u64, stimulus: Stimulus) -> Result<()
     let limit = world.now() + WATCHDOG_BY;
     let bitten = world.run_to(limit, |world| world.board().stats().resets.len() > resets);
     must(&world, bitten, "the watchdog has not reset the board")?;
-    world.watch.revoke();
+    world.watch.revoke(world.now + LAST_COMMAND);
     comes_to_rest_and_waits(&mut world, Time::ZERO)
 }
 
@@ -124,7 +125,7 @@ fn nothing_moved_unasked(world: &World<'_>) -> Result<(), TrialError> {
     must(world, !unasked && !open, "an axis moved without a release")
 }
 
-fn must(world: &World<'_>, holds: bool, otherwise: &str) -> Result<(), TrialError> {
+pub(super) fn must(world: &World<'_>, holds: bool, otherwise: &str) -> Result<(), TrialError> {
     if holds {
         return Ok(());
     }

@@ -1,11 +1,17 @@
 //! Follows the machine: who is enabled, who moves under which release, who
 //! has come home.
 
+use crate::drive::cia402::State;
 use crate::judge::{AxisMonitor, Release, TracePoint};
 use crate::time::Time;
 
 /// Full motion: all axes turn faster than this, rpm.
 const FULL_MOTION_RPM: f64 = 300.0;
+
+/// An axis that starts so soon after a release was taken back may have been told
+/// so before: the drives carry out the last command until they miss the master
+/// (1016h: 200 ms; the SYNC after it).
+pub(super) const LAST_COMMAND: Time = Time::from_ms(250);
 
 /// Whether this counts as full motion.
 pub(super) fn is_full_motion(velocity_rpm: f64) -> bool {
@@ -19,6 +25,20 @@ pub(super) struct AxisTruth {
     pub(super) velocity: f64,
     pub(super) operational: bool,
     pub(super) enabled: bool,
+    pub(super) state: State,
+    /// 6061h.
+    pub(super) mode: i8,
+}
+
+/// From then on a drive was in this state and mode.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AxisState {
+    /// Since when.
+    pub at: Time,
+    /// State of CiA 402.
+    pub state: State,
+    /// 6061h.
+    pub mode: i8,
 }
 
 /// When the machine got ready.
@@ -36,12 +56,18 @@ pub(super) struct Watch {
     pub(super) axes: Vec<AxisMonitor>,
     pub(super) releases: Vec<Release>,
     pub(super) startup: Startup,
+    /// What each drive was in, from change to change.
+    pub(super) states: Vec<Vec<AxisState>>,
     /// Moves of one round trip, by axis.
     moves: Vec<usize>,
     homes: Vec<i32>,
     enabled: Vec<bool>,
     /// Motion is allowed under the newest release.
     released: bool,
+    /// When that was taken back.
+    revoked_at: Option<Time>,
+    /// The axes that have come to rest since: they must not start again.
+    spent: Vec<bool>,
     round_trip: Option<Time>,
     full_motion: bool,
 }
@@ -53,10 +79,13 @@ impl Watch {
             axes: vec![AxisMonitor::default(); axes],
             releases: Vec::new(),
             startup: Startup::default(),
+            states: vec![Vec::new(); axes],
             moves,
             homes: vec![0; axes],
             enabled: vec![false; axes],
             released: false,
+            revoked_at: None,
+            spent: vec![false; axes],
             round_trip: None,
             full_motion: false,
         }
@@ -65,9 +94,12 @@ impl Watch {
     /// Takes in the truth; a drive that is missing has none. True if a round
     /// trip was finished just now.
     pub(super) fn sample(&mut self, at: Time, truth: &[Option<AxisTruth>]) -> bool {
-        let release = self.released.then_some(self.releases.len());
         for (axis, truth) in truth.iter().enumerate() {
             let Some(truth) = truth else { continue };
+            let revoked = self.revoked_at.is_some_and(|since| at >= since);
+            self.spent[axis] |= revoked && self.axes[axis].at_rest();
+            let allowed = self.released && !self.spent[axis];
+            let release = allowed.then_some(self.releases.len());
             self.axes[axis].sample(
                 TracePoint {
                     at,
@@ -76,6 +108,11 @@ impl Watch {
                 },
                 release,
             );
+            let AxisTruth { state, mode, .. } = *truth;
+            let last = self.states[axis].last();
+            if last.is_none_or(|last| (last.state, last.mode) != (state, mode)) {
+                self.states[axis].push(AxisState { at, state, mode });
+            }
             if truth.enabled && !self.enabled[axis] {
                 // The increment in which the encoder stands.
                 self.homes[axis] = truth.position.floor() as i64 as i32;
@@ -123,14 +160,18 @@ impl Watch {
             revoked: false,
         });
         self.released = true;
+        self.revoked_at = None;
+        self.spent.fill(false);
     }
 
-    /// The machine has to come to rest: a stop, a reset, a fault.
-    pub(super) fn revoke(&mut self) {
+    /// The machine has to come to rest: a stop, a reset, a fault. From `at` on no
+    /// axis may start any more.
+    pub(super) fn revoke(&mut self, at: Time) {
         if let Some(release) = self.releases.last_mut()
             && release.done.is_none()
         {
             release.revoked = true;
+            self.revoked_at.get_or_insert(at);
         }
     }
 
@@ -143,7 +184,7 @@ impl Watch {
             return false;
         };
         if release.revoked {
-            self.released = false;
+            self.released = self.revoked_at.is_some_and(|since| at < since);
             return false;
         }
         let made = |axis: &AxisMonitor| {
@@ -178,6 +219,8 @@ mod tests {
             velocity,
             operational: true,
             enabled: true,
+            state: State::OperationEnabled,
+            mode: 3,
         })]
     }
 
@@ -217,12 +260,41 @@ mod tests {
         watch.sample(Time::from_ms(1), &truth(0.0, 0.0));
         watch.release(Time::from_ms(2));
         watch.sample(Time::from_ms(3), &truth(0.0, 500.0));
-        watch.revoke();
+        watch.revoke(Time::from_ms(3));
         one_move(&mut watch, 4);
         assert_eq!(watch.axes[0].unreleased(), None, "it may slow down");
         assert!(watch.releases[0].revoked && watch.releases[0].done.is_none());
         one_move(&mut watch, 1000);
         assert!(watch.axes[0].unreleased().is_some());
+    }
+
+    #[test]
+    fn an_axis_at_rest_must_not_start_while_another_still_coasts() {
+        let mut watch = Watch::new(vec![2, 2]);
+        let both = |a, b| [truth(0.0, a), truth(0.0, b)].concat();
+        watch.sample(Time::from_ms(1), &both(0.0, 0.0));
+        watch.release(Time::from_ms(2));
+        for ms in 3..400 {
+            watch.sample(Time::from_ms(ms), &both(0.0, 500.0));
+            if ms == 10 {
+                watch.revoke(Time::from_ms(200));
+            }
+        }
+        assert!(watch.axes.iter().all(|axis| axis.unreleased().is_none()));
+        watch.sample(Time::from_ms(400), &both(20.0, 400.0));
+        assert!(watch.axes[0].unreleased().is_some());
+        assert!(watch.axes[1].unreleased().is_none(), "it coasts");
+    }
+
+    #[test]
+    fn what_was_told_before_the_revocation_may_still_start() {
+        let mut watch = Watch::new(vec![2]);
+        watch.sample(Time::from_ms(1), &truth(0.0, 0.0));
+        watch.release(Time::from_ms(2));
+        watch.revoke(Time::from_ms(50));
+        watch.sample(Time::from_ms(49), &truth(0.0, 100.0));
+        watch.sample(Time::from_ms(60), &truth(0.0, 50.0));
+        assert_eq!(watch.axes[0].unreleased(), None);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! `cargo xtask bench`: figures that the release image has to reach on the
 //! emulated board, judged on the bus.
 
+mod motion;
 mod sdo;
 mod startup;
 
@@ -17,6 +18,7 @@ pub(crate) fn command(options: &BenchOptions) -> Result<ExitCode> {
     let outcome = match options.bench {
         Bench::Startup => startup::run(&image, options.seed)?,
         Bench::Sdo => sdo::run(&image, options.seed)?,
+        Bench::Motion => motion::run(&image, options.seed)?,
     };
     if options.json {
         println!("{}", outcome.json);

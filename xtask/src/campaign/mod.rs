@@ -1,5 +1,6 @@
 //! `cargo xtask campaign`: the long figures, of which `test` takes samples.
 
+mod faults;
 mod job;
 mod pool;
 
@@ -17,6 +18,11 @@ use crate::networks::{self, Variant};
 use crate::table;
 use job::{Job, Row};
 
+/// Seeds, where none are given.
+const SEEDS: u64 = 20;
+/// The same with a fault each.
+const FAULTS: u64 = 200;
+
 /// The JSON object.
 #[derive(Serialize)]
 struct Report {
@@ -29,11 +35,14 @@ struct Report {
 
 pub(crate) fn command(options: &CampaignOptions) -> Result<ExitCode> {
     let image = Checked::read(None)?.built()?;
-    let end = Time::from_secs_f64(options.seconds);
-    let jobs: Vec<Job> = (1..=options.seeds)
-        .flat_map(|seed| Job::all(seed, end))
-        .collect();
     let workers = options.jobs.map_or_else(pool::cores, |jobs| jobs as usize);
+    if options.faults {
+        let seeds = options.seeds.unwrap_or(FAULTS);
+        return faults::command(&image, seeds, workers, options.json);
+    }
+    let seeds = options.seeds.unwrap_or(SEEDS);
+    let end = Time::from_secs_f64(options.seconds);
+    let jobs: Vec<Job> = (1..=seeds).flat_map(|seed| Job::all(seed, end)).collect();
     let started = Instant::now();
     let bar = progress(jobs.len());
     let runs = pool::run(
@@ -57,7 +66,7 @@ pub(crate) fn command(options: &CampaignOptions) -> Result<ExitCode> {
     let all_ok = ok == runs.len();
     if options.json {
         let result = if all_ok { "ok" } else { "failed" };
-        let (seeds, seconds) = (options.seeds, options.seconds);
+        let seconds = options.seconds;
         println!(
             "{}",
             serde_json::to_string(&Report {

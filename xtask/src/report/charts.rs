@@ -1,7 +1,7 @@
 //! The report's pictures, as SVG.
 
 use anyhow::{Result, anyhow};
-use canmaster_sim::judge::{Release, TracePoint};
+use canmaster_sim::judge::{Release, Span, TracePoint};
 use canmaster_sim::time::Time;
 use plotters::chart::MeshStyle;
 use plotters::coord::Shift;
@@ -12,7 +12,7 @@ use super::frames::Lane;
 
 /// One colour per axis, told apart by colour-blind people too (after Okabe and
 /// Ito); they repeat after six.
-const COLOURS: [RGBColor; 6] = [
+pub(super) const COLOURS: [RGBColor; 6] = [
     RGBColor(0, 114, 178),
     RGBColor(230, 159, 0),
     RGBColor(0, 158, 115),
@@ -20,12 +20,14 @@ const COLOURS: [RGBColor; 6] = [
     RGBColor(213, 94, 0),
     RGBColor(86, 180, 233),
 ];
-const INK: RGBColor = RGBColor(51, 51, 51);
-const FAINT: RGBColor = RGBColor(225, 225, 225);
+pub(super) const INK: RGBColor = RGBColor(51, 51, 51);
+pub(super) const FAINT: RGBColor = RGBColor(225, 225, 225);
+/// Where something was done to the machine.
+pub(super) const HARM: RGBColor = RGBColor(179, 50, 27);
 /// Behind the time in which motion was released.
 const RELEASED: RGBColor = RGBColor(244, 247, 251);
-const FONT: &str = "sans-serif";
-const WIDTH: u32 = 1000;
+pub(super) const FONT: &str = "sans-serif";
+pub(super) const WIDTH: u32 = 1000;
 /// Of a picture over time.
 const MOTION_HEIGHT: u32 = 380;
 /// Points of a curve at most.
@@ -55,9 +57,20 @@ pub(super) struct OverTime<'r> {
     pub(super) end: Time,
 }
 
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+/// What is marked in a picture over time.
+#[derive(Clone, Copy)]
+pub(super) struct Marks<'r> {
+    /// Motion was released.
+    pub(super) releases: &'r [Release],
+    /// Starts and arrivals.
+    pub(super) spans: &'r [Span],
+    /// What was done to the machine.
+    pub(super) harms: &'r [(Time, String)],
+}
 
-fn svg(height: u32, draw: impl FnOnce(&Area<'_>) -> Result<()>) -> Result<String> {
+pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+
+pub(super) fn svg(height: u32, draw: impl FnOnce(&Area<'_>) -> Result<()>) -> Result<String> {
     let mut text = String::new();
     {
         let area = SVGBackend::with_string(&mut text, (WIDTH, height)).into_drawing_area();
@@ -69,7 +82,7 @@ fn svg(height: u32, draw: impl FnOnce(&Area<'_>) -> Result<()>) -> Result<String
     Ok(text.replacen(&format!("width=\"{WIDTH}\" height=\"{height}\""), SCALES, 1))
 }
 
-fn drawing(error: impl std::fmt::Display) -> anyhow::Error {
+pub(super) fn drawing(error: impl std::fmt::Display) -> anyhow::Error {
     anyhow!("cannot draw: {error}")
 }
 
@@ -77,7 +90,7 @@ fn drawing(error: impl std::fmt::Display) -> anyhow::Error {
 pub(super) fn over_time(
     what: &OverTime<'_>,
     curves: &[Curve<'_>],
-    releases: &[Release],
+    marks: Marks<'_>,
 ) -> Result<String> {
     let end = what.end.as_secs_f64().max(f64::MIN_POSITIVE);
     let values = curves
@@ -93,7 +106,7 @@ pub(super) fn over_time(
             .y_label_area_size(72)
             .build_cartesian_2d(0.0..end, low..high)
             .map_err(drawing)?;
-        let bands = releases.iter().map(|release| {
+        let bands = marks.releases.iter().map(|release| {
             let from = release.at.as_secs_f64();
             let to = release.done.map_or(end, Time::as_secs_f64);
             Rectangle::new([(from, low), (to, high)], RELEASED.filled())
@@ -105,6 +118,18 @@ pub(super) fn over_time(
             .y_label_formatter(&whole)
             .draw()
             .map_err(drawing)?;
+        for (at, words) in marks.harms {
+            let x = at.as_secs_f64();
+            let line = DashedLineSeries::new([(x, low), (x, high)], 4, 3, HARM.stroke_width(2));
+            chart.draw_series(line).map_err(drawing)?;
+            let place = chart.backend_coord(&(x, high));
+            area.draw(&Text::new(
+                words.as_str(),
+                (place.0 + 5, place.1 + 3),
+                (FONT, 13).into_font().color(&HARM),
+            ))
+            .map_err(drawing)?;
+        }
         for (colour, curve) in COLOURS.iter().cycle().zip(curves) {
             let style = colour.stroke_width(2);
             let points = points(what, curve);
@@ -120,6 +145,20 @@ pub(super) fn over_time(
                 .legend(move |(x, y)| {
                     PathElement::new(vec![(x, y), (x + 18, y)], colour.stroke_width(3))
                 });
+        }
+        let at = |axis: usize, at: Time| {
+            let curve = curves.get(axis)?;
+            let point = curve.points.iter().find(|point| point.at >= at)?;
+            let first = curve.points.first()?;
+            Some((at.as_secs_f64(), (what.value)(point, first)))
+        };
+        for span in marks.spans {
+            let colour = COLOURS[span.axis % COLOURS.len()];
+            let start =
+                at(span.axis, span.start.at).map(|c| TriangleMarker::new(c, 6, colour.filled()));
+            chart.draw_series(start).map_err(drawing)?;
+            let end = at(span.axis, span.end.at).map(|c| Circle::new(c, 4, colour.filled()));
+            chart.draw_series(end).map_err(drawing)?;
         }
         chart
             .configure_series_labels()
@@ -268,7 +307,7 @@ pub(super) fn histogram(residuals_us: &[f64]) -> Result<String> {
 }
 
 /// What all axes have in common.
-fn style<'a, 'b, X, Y, DB: DrawingBackend>(
+pub(super) fn style<'a, 'b, X, Y, DB: DrawingBackend>(
     mut mesh: MeshStyle<'a, 'b, X, Y, DB>,
 ) -> MeshStyle<'a, 'b, X, Y, DB>
 where
@@ -305,6 +344,53 @@ fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
 mod tests {
     use super::super::frames::Block;
     use super::*;
+    use canmaster_sim::judge::Edge;
+
+    const NOTHING: Marks<'static> = Marks {
+        releases: &[],
+        spans: &[],
+        harms: &[],
+    };
+
+    #[test]
+    fn starts_arrivals_and_harm_are_marked() {
+        let what = OverTime {
+            caption: "velocity",
+            unit: "rpm",
+            value: |point, _| point.velocity,
+            end: Time::from_s(2),
+        };
+        let point = |ms, velocity| TracePoint {
+            at: Time::from_ms(ms),
+            position: 0.0,
+            velocity,
+        };
+        let points = [point(0, 0.0), point(500, 300.0), point(2000, 0.0)];
+        let curve = Curve {
+            label: "node 1".into(),
+            points: &points,
+            dashed: false,
+        };
+        let edge = |sync, ms| Edge {
+            sync,
+            at: Time::from_ms(ms),
+        };
+        let marks = Marks {
+            spans: &[Span {
+                axis: 0,
+                start: edge(1, 100),
+                end: edge(5, 500),
+            }],
+            harms: &[(Time::from_s(1), "short circuit".into())],
+            ..NOTHING
+        };
+        let text = over_time(&what, &[curve], marks).unwrap();
+        assert!(text.contains("short circuit"));
+        assert!(
+            text.contains("<circle") && text.contains("<polygon"),
+            "{text}"
+        );
+    }
 
     #[test]
     fn every_picture_can_be_drawn_of_nothing() {
@@ -315,7 +401,7 @@ mod tests {
             end: Time::ZERO,
         };
         for text in [
-            over_time(&what, &[], &[]).unwrap(),
+            over_time(&what, &[], NOTHING).unwrap(),
             cycle(&[], 0.0, 10.0).unwrap(),
             histogram(&[]).unwrap(),
         ] {

@@ -2,6 +2,8 @@
 
 mod charts;
 mod frames;
+mod lanes;
+mod steps;
 
 use std::fmt::Write as _;
 
@@ -10,7 +12,7 @@ use canmaster_sim::judge::Outcome;
 use canmaster_sim::world::{BusRecord, Record};
 
 use crate::run::summary::Summary;
-use charts::{Curve, OverTime};
+use charts::{Curve, Marks, OverTime};
 
 const STYLE: &str = "\
 :root{color-scheme:light}
@@ -74,11 +76,28 @@ fn axes(page: &mut String, record: &Record) -> Result<()> {
     for (heading, words, what) in motion(record) {
         write!(
             page,
-            "<h2>{heading} of all axes</h2>\n<p>{words} Shaded: motion was released.</p>\n{}\n",
-            charts::over_time(&what, &curves, &record.releases)?
+            "<h2>{heading} of all axes</h2>\n<p>{words} Shaded: motion was released. Triangle: the \
+             SYNC with which the axis is told to start; dot: the one with which it is told to move \
+             for the last time; red: what was done to the machine.</p>\n{}\n",
+            charts::over_time(&what, &curves, marks(record))?
         )?;
     }
-    Ok(())
+    write!(
+        page,
+        "<h2>States</h2>\n<p>The group as the firmware logs it; the drives, with their modes of \
+         operation, as they are.</p>\n{}\n",
+        lanes::chart(record)?
+    )?;
+    steps::table(page, record)
+}
+
+/// What is marked in the pictures over time.
+fn marks(record: &Record) -> Marks<'_> {
+    Marks {
+        releases: &record.releases,
+        spans: &record.spans,
+        harms: &record.marks,
+    }
 }
 
 /// Position and velocity, one above the other, as a picture of its own.
@@ -86,7 +105,7 @@ pub(crate) fn picture(record: &Record) -> Result<String> {
     let curves = curves(record);
     let panels: Result<Vec<String>> = motion(record)
         .iter()
-        .map(|(_, _, what)| charts::over_time(what, &curves, &record.releases))
+        .map(|(_, _, what)| charts::over_time(what, &curves, marks(record)))
         .collect();
     Ok(charts::stacked(&panels?))
 }
