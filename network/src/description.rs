@@ -46,6 +46,10 @@ pub(crate) struct Bus {
     pub(crate) compute_us: Option<Spanned<i64>>,
     pub(crate) guard_us: Option<Spanned<i64>>,
     pub(crate) sdo_frames: Option<Spanned<i64>>,
+    pub(crate) sdo_every: Option<Spanned<i64>>,
+    pub(crate) emcy_frames: Option<Spanned<i64>>,
+    pub(crate) heartbeats_wait: Option<bool>,
+    pub(crate) rpdos: Option<Spanned<String>>,
     pub(crate) load_limit: Option<Spanned<f64>>,
 }
 
@@ -53,6 +57,7 @@ pub(crate) struct Bus {
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Liveness {
+    pub(crate) by: Option<Spanned<String>>,
     pub(crate) missing_tpdos: Option<Spanned<i64>>,
 }
 
@@ -69,7 +74,10 @@ pub(crate) struct Device {
     pub(crate) master_timeout_ms: Spanned<i64>,
     pub(crate) sdo_timeout_ms: Option<Spanned<i64>>,
     pub(crate) configured: Option<Spanned<Vec<i64>>>,
+    pub(crate) tpdo_earliest_us: Option<Spanned<i64>>,
     pub(crate) tpdo_latency_us: Option<Spanned<i64>>,
+    pub(crate) sdo_latency_us: Option<Spanned<Vec<i64>>>,
+    pub(crate) heartbeat_in_operational: Option<Spanned<bool>>,
     #[serde(default)]
     pub(crate) rpdo: BTreeMap<Spanned<String>, Spanned<Pdo>>,
     #[serde(default)]
@@ -86,6 +94,7 @@ pub(crate) struct Device {
 pub(crate) struct Pdo {
     pub(crate) map: Vec<Spanned<String>>,
     pub(crate) transmission: Option<Spanned<i64>>,
+    pub(crate) send: Option<Spanned<String>>,
 }
 
 /// `[device.NAME.axis]`, `[node.axis]`

@@ -19,6 +19,10 @@ pub const SDO_BYTES: u8 = 8;
 pub const SYNC_BYTES: u8 = 0;
 /// Heartbeat (CiA 301, 7.2.8.3.2.2).
 pub const HEARTBEAT_BYTES: u8 = 1;
+/// EMCY (CiA 301, 7.2.7.2).
+pub const EMCY_BYTES: u8 = 8;
+/// TIME (CiA 301, 7.2.6), longer than any NMT command.
+pub const TIME_BYTES: u8 = 6;
 
 #[cfg(test)]
 mod tests {

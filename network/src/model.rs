@@ -12,10 +12,33 @@ pub struct Machine {
     pub master: Master,
     /// The buses, by name.
     pub buses: Vec<Bus>,
+    /// What tells that a node is lost.
+    pub liveness: Liveness,
     /// Cycles in a row without a TPDO after which its node counts as lost.
     pub missing_tpdos: u8,
     /// The nodes, in the order of the axes.
     pub nodes: Vec<Node>,
+}
+
+impl Machine {
+    /// Cycles in a row without a TPDO after which the firmware takes its node for
+    /// lost: as many as it counts, where only heartbeats tell.
+    pub fn missing_limit(&self) -> u8 {
+        match self.liveness {
+            Liveness::Tpdo => self.missing_tpdos,
+            Liveness::Heartbeat => u8::MAX,
+        }
+    }
+}
+
+/// What tells that a node is lost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Liveness {
+    /// Its TPDO is missing, or its heartbeat, where it has one.
+    #[default]
+    Tpdo,
+    /// Its heartbeat is missing; TPDOs may be.
+    Heartbeat,
 }
 
 /// `[master]`
@@ -72,6 +95,8 @@ pub struct Node {
     pub identity: Identity,
     /// 1017h of the node.
     pub heartbeat_ms: u16,
+    /// Whether it sends its heartbeat in operational, too.
+    pub heartbeat_in_operational: bool,
     /// 1016h of the node: how long it waits for the master.
     pub master_timeout_ms: u16,
     /// How long its SDO server may take.
@@ -79,8 +104,13 @@ pub struct Node {
     /// 1020h:1 and 1020h:2 of a node that is configured already; 0 and 0: it is
     /// configured at every boot-up.
     pub configured: [u32; 2],
-    /// From SYNC to its request to send TPDOs, at worst.
+    /// From SYNC to its request to send TPDOs, at best.
+    pub tpdo_earliest_us: u32,
+    /// The same at worst.
     pub tpdo_latency_us: u32,
+    /// From an SDO request to its answer, at best and at worst; `None`: nobody
+    /// knows.
+    pub sdo_latency_us: Option<(u32, u32)>,
     /// RPDOs in use, by number.
     pub rpdos: Vec<Pdo>,
     /// TPDOs in use, by number.
@@ -160,6 +190,16 @@ pub struct Identity {
     pub serial: Option<u32>,
 }
 
+/// When the master sends an RPDO.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Send {
+    /// In every cycle.
+    #[default]
+    EveryCycle,
+    /// When its values change; to one node of a bus in a cycle.
+    OnChange,
+}
+
 /// A PDO in use.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
@@ -170,11 +210,23 @@ pub struct Pdo {
     pub number: u8,
     /// Transmission type.
     pub transmission: u8,
+    /// When the master sends it; of an RPDO.
+    pub send: Send,
     /// What it carries.
     pub mapping: Vec<Mapped>,
 }
 
+/// Controlword, and the targets of each mode of CiA 402.
+const ANSWERS_TO_TPDOS: [u16; 6] = [0x6040, 0x6042, 0x6071, 0x607A, 0x60C1, 0x60FF];
+
 impl Pdo {
+    /// Whether it carries a controlword or a target: what the master works out
+    /// from the TPDOs of the cycle.
+    pub fn answers_to_tpdos(&self) -> bool {
+        let mut indices = self.mapping.iter().map(|entry| entry.at.index);
+        indices.any(|index| ANSWERS_TO_TPDOS.contains(&index))
+    }
+
     /// Its identifier at a node (CiA 301, 7.3.5).
     pub fn cob_id(&self, node: u8) -> u16 {
         self.direction.function_code(self.number) + u16::from(node)

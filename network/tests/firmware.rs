@@ -36,10 +36,10 @@ fn says(from: &str, to: &str, expected: &[&str]) {
 #[test]
 fn what_an_axis_needs_is_mapped_once() {
     says(
-        r#"map = ["Velocity actual value", "Torque actual value"]"#,
-        r#"map = ["Torque actual value"]"#,
+        r#"map = ["Statusword", "Position actual value"]"#,
+        r#"map = ["Statusword"]"#,
         &[
-            "`606Ch:00 \"Velocity actual value\"`",
+            "`6064h:00 \"Position actual value\"`",
             "map it once in TPDO1 or TPDO2",
         ],
     );

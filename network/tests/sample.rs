@@ -61,7 +61,7 @@ fn the_generated_network_is_the_one_of_the_library() {
     assert_eq!(generated::TPDO_MISSING_LIMIT, GROUP.missing_tpdo_max);
     // What comes after the deadline at worst still fits.
     const { assert!(generated::SHORTEST_CYCLE_US > generated::TPDO_DEADLINE_US as u32) };
-    assert_eq!((generated::COMPUTE_US, generated::RPDOS_US), (200, 1_635));
+    assert_eq!((generated::COMPUTE_US, generated::RPDOS_US), (200, 825));
     assert_eq!(generated::LONGEST_CYCLE_US, 65_535);
     assert_eq!(generated::BIT_TIMING, (1, 20, 3));
 }

@@ -25,6 +25,41 @@ pub(crate) const BIT_TIMING: BitTiming = {
     }
 };
 
+/// What a description may ask for and the firmware does not do is refused here.
+const _: () = {
+    let [controller] = generated::BUS_PERIPHERALS;
+    assert!(generated::BUSES == 1 && controller == 1, "it drives FDCAN1");
+    let [(prescaler, ..)] = generated::BUS_BIT_TIMINGS;
+    assert!(
+        prescaler == generated::BIT_TIMING.0,
+        "one bus, one bit timing"
+    );
+    let [bus, ..] = generated::AXIS_BUSES;
+    assert!(bus == 0, "all axes are on the first bus");
+    assert!(
+        !generated::RPDOS_AFTER_SYNC,
+        "it sends RPDOs after the TPDOs"
+    );
+    let ([false], [from], [until], [false], [0]) = (
+        generated::ONE_PLANNED,
+        generated::SDO_FROM_US,
+        generated::SDO_UNTIL_US,
+        generated::SDO_NEXT_CYCLE,
+        generated::SDO_EVERY,
+    ) else {
+        panic!("it does not plan SDO frames");
+    };
+    assert!(from <= until);
+    let [after_sync] = generated::AFTER_SYNC_US;
+    assert!(after_sync as u32 + generated::GUARD_US as u32 <= NETWORK.cycle.as_micros());
+    let [true, ..] = generated::RAMPS_ON_CHANGE else {
+        panic!("it sends ramps on change");
+    };
+    let [true, ..] = generated::HEARTBEATS_IN_OPERATIONAL else {
+        panic!("it lets heartbeats run");
+    };
+};
+
 /// Where in its PDOs each object of each axis lies.
 pub(crate) static PDOS: [AxisPdos; AXES] = match AxisPdos::of_all(&NETWORK) {
     Some(pdos) => pdos,

@@ -19,11 +19,12 @@ const NS_PER_US: u64 = 1000;
 const PER_MILLE_TO_PERCENT: u32 = 10;
 
 /// Rows of the table of a cycle.
-const ROWS: [(SlotKind, &str); 7] = [
+const ROWS: [(SlotKind, &str); 8] = [
     (SlotKind::Sync, "SYNC"),
     (SlotKind::Latency, "drives answer"),
     (SlotKind::Tpdo, "TPDOs"),
-    (SlotKind::Other, "heartbeats, SDO"),
+    (SlotKind::Planned, "planned"),
+    (SlotKind::Other, "heartbeats, EMCY, SDO"),
     (SlotKind::Compute, "master computes"),
     (SlotKind::Rpdo, "RPDOs"),
     (SlotKind::Guard, "guard"),

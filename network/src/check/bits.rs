@@ -23,7 +23,7 @@ pub(crate) fn peripherals(description: &Description, buses: &[Bus], context: &mu
                 &place,
                 peripheral.get_ref(),
                 format!("the bus \"{}\" has this controller already", other.name),
-                "put its nodes on that bus: the firmware drives one bus",
+                "put its nodes on that bus, or use another controller",
             );
         }
     }

@@ -1,7 +1,9 @@
 //! Whether the frames of a cycle fit into it.
 
-use crate::description::Description;
-use crate::layout::{Demand, Layout, SlotKind};
+use toml::Spanned;
+
+use crate::description::{self, Description};
+use crate::layout::{Demand, Layout, RpdoOrder, SlotKind};
 use crate::model::{Bus, Master, Node};
 use crate::resolve::Context;
 
@@ -13,66 +15,166 @@ pub(crate) fn capacity(
     nodes: &[Node],
     context: &mut Context<'_>,
 ) -> Vec<Bus> {
-    let described = description.bus.values();
-    let buses = buses.into_iter().enumerate().zip(described);
-    buses
-        .map(|((place, bus), described)| {
+    let described: Vec<&description::Bus> =
+        description.bus.values().map(|bus| bus.get_ref()).collect();
+    same_cycle(&described, &buses, context);
+    let demands: Vec<Demand> = buses
+        .iter()
+        .enumerate()
+        .map(|(place, bus)| {
             let nodes = nodes.iter().filter(|node| node.bus == place);
             let fixed = &bus.layout.demand;
-            let demand = Demand {
+            Demand {
                 load_limit: fixed.load_limit,
                 compute_us: fixed.compute_us,
                 guard_us: fixed.guard_us,
+                order: fixed.order,
                 sdo_frames: fixed.sdo_frames,
+                sdo_every: fixed.sdo_every,
+                emcy_frames: fixed.emcy_frames,
+                heartbeats_wait: fixed.heartbeats_wait,
                 ..Demand::of(nodes, master.heartbeat_ms, bus.bit_rate)
-            };
-            let layout = demand.layout(bus.cycle_us);
-            if !layout.fits() {
-                let cycle = &described.get_ref().cycle_us;
-                let at = context.at(cycle);
-                context.problems.error(
-                    &at,
-                    cycle.get_ref(),
-                    too_much(&bus.name, &layout),
-                    change(&layout),
-                );
-            }
-            let explicit = described.get_ref().tpdo_deadline_us.as_ref();
-            if let Some(deadline) = explicit {
-                let at = context.at(deadline);
-                let us = bus.tpdo_deadline_us;
-                let latest = bus.cycle_us.saturating_sub(layout.after_tpdos_us());
-                if us < layout.tpdos_us() {
-                    context.problems.error(
-                        &at,
-                        us,
-                        format!("the last TPDO may come {} us after SYNC", layout.tpdos_us()),
-                        format!("write {} ..= {latest}", layout.tpdos_us()),
-                    );
-                } else if us > latest {
-                    context.problems.error(
-                        &at,
-                        us,
-                        format!(
-                            "computation, RPDOs and guard take {} us, and the cycle is {} us",
-                            layout.after_tpdos_us(),
-                            bus.cycle_us
-                        ),
-                        format!("write {} ..= {latest}", layout.tpdos_us()),
-                    );
-                }
-            }
-            let tpdo_deadline_us = match explicit {
-                Some(_) => bus.tpdo_deadline_us,
-                None => layout.tpdos_us(),
-            };
-            Bus {
-                layout,
-                tpdo_deadline_us,
-                ..bus
             }
         })
-        .collect()
+        .collect();
+    for (described, demand) in described.iter().zip(&demands) {
+        sdo(described, demand, context);
+    }
+    let layouts = in_order(&described, &buses, &demands);
+    let tries = layouts.iter().zip(&buses).zip(&described);
+    for ((layout, bus), described) in tries {
+        if !layout.fits() {
+            let cycle = &described.cycle_us;
+            let at = context.at(cycle);
+            context.problems.error(
+                &at,
+                cycle.get_ref(),
+                too_much(&bus.name, layout),
+                change(layout, described.rpdos.is_none()),
+            );
+        }
+    }
+    let last = layouts.iter().map(Layout::tpdos_us).max().unwrap_or(0);
+    let mut tpdo_deadline_us = last;
+    for ((bus, layout), described) in buses.iter().zip(&layouts).zip(&described) {
+        if let Some(at) = &described.tpdo_deadline_us {
+            deadline(bus, layout, at, context);
+            tpdo_deadline_us = tpdo_deadline_us.max(bus.tpdo_deadline_us);
+        }
+    }
+    let all = buses.into_iter().zip(layouts);
+    all.map(|(bus, layout)| Bus {
+        layout,
+        tpdo_deadline_us,
+        ..bus
+    })
+    .collect()
+}
+
+/// One timer makes the SYNCs of all buses.
+fn same_cycle(described: &[&description::Bus], buses: &[Bus], context: &mut Context<'_>) {
+    let Some((first, others)) = buses.split_first() else {
+        return;
+    };
+    for (bus, described) in others.iter().zip(described.iter().skip(1)) {
+        if bus.cycle_us != first.cycle_us {
+            let at = context.at(&described.cycle_us);
+            context.problems.error(
+                &at,
+                described.cycle_us.get_ref(),
+                format!(
+                    "the SYNCs of all buses leave together, and bus \"{}\" has a cycle of {} us",
+                    first.name, first.cycle_us
+                ),
+                "give all buses the same cycle_us",
+            );
+        }
+    }
+}
+
+/// Whether planned SDO frames can be kept out of the guard at all.
+fn sdo(described: &description::Bus, demand: &Demand, context: &mut Context<'_>) {
+    let Some(frames) = &described.sdo_frames else {
+        return;
+    };
+    if demand.is_planned() && !demand.sdo_can_be_planned() {
+        let at = context.at(frames);
+        context.problems.error(
+            &at,
+            frames.get_ref(),
+            "with one SDO frame in a cycle, a request at its end must not be answered before the \
+             next SYNC, and the soonest answer of sdo_latency_us is sooner than a frame and \
+             guard_us",
+            "write sdo_frames = 2, for the answer in the same cycle, or lower guard_us",
+        );
+    }
+}
+
+/// The layouts of all buses with RPDOs after the TPDOs; if they do not fit, and
+/// nobody wants that, after SYNC. The axes are stepped together: when all TPDOs of
+/// all buses are there.
+fn in_order(described: &[&description::Bus], buses: &[Bus], demands: &[Demand]) -> Vec<Layout> {
+    let with = |order: Option<RpdoOrder>| -> Vec<Layout> {
+        let layouts = |elsewhere_us: u32| -> Vec<Layout> {
+            let all = demands.iter().zip(buses);
+            all.map(|(demand, bus)| {
+                let order = order.unwrap_or(demand.order);
+                let demand = Demand {
+                    order,
+                    elsewhere_us,
+                    ..demand.clone()
+                };
+                demand.layout(bus.cycle_us)
+            })
+            .collect()
+        };
+        let last = layouts(0).iter().map(Layout::tpdos_us).max();
+        layouts(last.unwrap_or(0))
+    };
+    let asked = described.iter().find_map(|bus| bus.rpdos.as_ref());
+    if let Some(place) = asked.and_then(|asked| {
+        described
+            .iter()
+            .position(|bus| bus.rpdos.as_ref().map(Spanned::span) == Some(asked.span()))
+    }) {
+        // One of them speaks for all.
+        return with(demands.get(place).map(|demand| demand.order));
+    }
+    let first = with(Some(RpdoOrder::AfterTpdos));
+    if first.iter().all(Layout::fits) {
+        return first;
+    }
+    let second = with(Some(RpdoOrder::AfterSync));
+    match second.iter().all(Layout::fits) {
+        true => second,
+        false => first,
+    }
+}
+
+fn deadline(bus: &Bus, layout: &Layout, at: &Spanned<i64>, context: &mut Context<'_>) {
+    let place = context.at(at);
+    let us = bus.tpdo_deadline_us;
+    let soonest = layout.tpdos_us().max(layout.demand.elsewhere_us);
+    let latest = bus.cycle_us.saturating_sub(layout.after_tpdos_us());
+    if us < soonest {
+        context.problems.error(
+            &place,
+            us,
+            format!("the last TPDO may come {soonest} us after SYNC"),
+            format!("write {soonest} ..= {latest}"),
+        );
+    } else if us > latest {
+        context.problems.error(
+            &place,
+            us,
+            format!(
+                "computation, RPDOs and guard take {} us, and the cycle is {} us",
+                layout.after_tpdos_us(),
+                bus.cycle_us
+            ),
+            format!("write {soonest} ..= {latest}"),
+        );
+    }
 }
 
 const PERCENT: u32 = 10;
@@ -92,17 +194,37 @@ fn too_much(bus: &str, layout: &Layout) -> String {
     )
 }
 
-fn change(layout: &Layout) -> String {
+/// `any_order`: the description leaves the order of the RPDOs open.
+fn change(layout: &Layout, any_order: bool) -> String {
     let what = match layout.largest() {
         SlotKind::Tpdo => "map fewer TPDOs",
-        SlotKind::Rpdo => "map fewer RPDOs",
+        SlotKind::Rpdo => "map fewer RPDOs, or send = \"on change\"",
         SlotKind::Other => "make heartbeats rarer and sdo_frames fewer",
+        SlotKind::Planned => "make sdo_frames fewer",
         SlotKind::Latency => "use drives that answer SYNC sooner",
         SlotKind::Compute => "lower compute_us",
         SlotKind::Sync | SlotKind::Guard => "lower guard_us",
     };
-    match layout.demand.smallest_cycle() {
-        Some(cycle) => format!("the smallest cycle that fits is {cycle} us; or {what}"),
-        None => format!("no cycle up to a second fits; {what}, or take a higher bit rate"),
+    let smallest = |order| {
+        let demand = Demand {
+            order,
+            ..layout.demand.clone()
+        };
+        demand.smallest_cycle()
+    };
+    let here = smallest(layout.demand.order);
+    let with = |order| smallest(order).filter(|us| here.is_none_or(|here| *us < here));
+    let sooner = with(RpdoOrder::AfterSync);
+    match (here, sooner) {
+        (_, Some(cycle)) if any_order => {
+            format!("the smallest cycle that fits is {cycle} us; or {what}")
+        }
+        (_, Some(cycle)) if cycle <= layout.cycle_us => {
+            format!("leave rpdos out: after SYNC, {cycle} us fit; or {what}")
+        }
+        (Some(cycle), _) => format!("the smallest cycle that fits is {cycle} us; or {what}"),
+        (None, _) => {
+            format!("no cycle up to a second fits; {what}, or take a higher bit rate")
+        }
     }
 }

@@ -5,7 +5,7 @@ use toml::Spanned;
 
 use super::device;
 use crate::description::{Axis, Description, Node as Described};
-use crate::model::{Node, Pdo};
+use crate::model::{Node, Pdo, Send};
 use crate::object::{Address, Direction};
 use crate::resolve::Context;
 
@@ -32,10 +32,9 @@ const COMMANDS: [(Address, u8, &str); 4] = [
     (Address::new(0x6084, 0), 32, "Profile deceleration"),
 ];
 /// What it has to be told.
-const FEEDBACK: [(Address, u8, &str); 3] = [
+const FEEDBACK: [(Address, u8, &str); 2] = [
     (Address::new(0x6041, 0), 16, "Statusword"),
     (Address::new(0x6064, 0), 32, "Position actual value"),
-    (Address::new(0x606C, 0), 32, "Velocity actual value"),
 ];
 
 pub(crate) fn firmware(description: &Description, nodes: &[Node], context: &mut Context<'_>) {
@@ -175,6 +174,13 @@ fn pdos(direction: Direction, node: &Node, described: &Described, context: &mut 
                 name.clone(),
                 "the firmware exchanges its PDOs at every SYNC".to_string(),
                 "leave transmission out, or write 1".to_string(),
+            );
+        }
+        if pdo.send == Send::OnChange && pdo.answers_to_tpdos() {
+            problem(
+                name.clone(),
+                "the firmware sends controlword and target velocity in every cycle".to_string(),
+                "leave send out, or move them to the other RPDO".to_string(),
             );
         }
         for entry in &pdo.mapping {

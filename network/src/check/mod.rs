@@ -6,6 +6,7 @@ mod configuration;
 mod error_control;
 mod firmware;
 mod identifiers;
+mod liveness;
 
 pub(crate) use bits::{bit_rates, peripherals};
 pub(crate) use capacity::capacity;
@@ -13,6 +14,7 @@ pub(crate) use configuration::configuration;
 pub(crate) use error_control::error_control;
 pub(crate) use firmware::firmware;
 pub(crate) use identifiers::identifiers;
+pub(crate) use liveness::liveness;
 
 use crate::description::{Description, Device, Node};
 

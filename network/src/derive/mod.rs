@@ -1,5 +1,6 @@
 //! What follows from a machine.
 
+mod cycle;
 mod dbc;
 mod dcf;
 mod picture;

@@ -1,13 +1,14 @@
 //! A cycle as a line of text.
 
-use crate::layout::{Layout, SlotKind};
+use crate::layout::{Layout, Slot, SlotKind};
 
 /// Letters of the picture and what they stand for.
-const LETTERS: [(SlotKind, char, &str); 7] = [
+const LETTERS: [(SlotKind, char, &str); 8] = [
     (SlotKind::Sync, 'S', "SYNC"),
     (SlotKind::Latency, '.', "drives answer"),
     (SlotKind::Tpdo, 'T', "TPDOs"),
-    (SlotKind::Other, 'o', "heartbeats, SDO"),
+    (SlotKind::Planned, 'p', "planned"),
+    (SlotKind::Other, 'o', "heartbeats, EMCY, SDO"),
     (SlotKind::Compute, 'c', "master computes"),
     (SlotKind::Rpdo, 'R', "RPDOs"),
     (SlotKind::Guard, '|', "guard"),
@@ -21,7 +22,15 @@ pub fn picture(layout: &Layout, width: usize) -> String {
     let cycle_ns = u64::from(layout.cycle_us.max(1)) * NS_PER_US;
     let column = |ns: u64| (ns.min(cycle_ns) * width as u64 / cycle_ns) as usize;
     let mut line = vec![' '; width];
-    for slot in &layout.slots {
+    let mut slots: Vec<&Slot> = layout.slots.iter().collect();
+    // What is on the wire meanwhile is drawn over the computation; and SYNC is seen,
+    // however short it is.
+    slots.sort_by_key(|slot| match slot.kind {
+        SlotKind::Compute => 0,
+        SlotKind::Sync => 2,
+        _ => 1,
+    });
+    for slot in slots {
         let Some((_, letter, _)) = LETTERS.iter().find(|(kind, ..)| *kind == slot.kind) else {
             continue;
         };

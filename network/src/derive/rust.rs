@@ -48,7 +48,7 @@ fn write(machine: &Machine, library: &str, out: &mut String) -> std::fmt::Result
     writeln!(
         out,
         "pub const TPDO_MISSING_LIMIT: u8 = {};",
-        machine.missing_tpdos
+        machine.missing_limit()
     )?;
     writeln!(
         out,
@@ -76,9 +76,11 @@ fn write(machine: &Machine, library: &str, out: &mut String) -> std::fmt::Result
     let t = bus.timing;
     writeln!(
         out,
-        "pub const BIT_TIMING: (u16, u16, u16) = ({}, {}, {});\n",
+        "pub const BIT_TIMING: (u16, u16, u16) = ({}, {}, {});",
         t.prescaler, t.seg1, t.seg2
     )?;
+    super::cycle::cycle(machine, out)?;
+    out.push('\n');
     motors(machine, out)?;
     writeln!(out, "/// The bus \"{}\".", bus.name.escape_default())?;
     writeln!(out, "pub static NETWORK: Network = Network {{")?;

@@ -5,7 +5,7 @@ use toml::Spanned;
 
 use super::context::Context;
 use crate::description::{self, Description};
-use crate::layout::Demand;
+use crate::layout::{Demand, RpdoOrder};
 use crate::model::Bus;
 use crate::problem::nearest;
 use crate::timing::{BIT_RATES, BitTiming, CLOCK_HZ, SAMPLE_POINT, sample_point_limits};
@@ -15,19 +15,29 @@ pub(crate) const CYCLE_MIN_US: i64 = 500;
 /// What the sixteen bits of the deadline's timer count.
 pub(crate) const CYCLE_MAX_US: i64 = u16::MAX as i64;
 /// Controllers that the firmware drives.
-const PERIPHERALS: [(&str, u8); 1] = [("FDCAN1", 1)];
+const PERIPHERALS: [(&str, u8); 3] = [("FDCAN1", 1), ("FDCAN2", 2), ("FDCAN3", 3)];
 /// From the last TPDO to the first RPDO, as measured with room to spare.
 const COMPUTE_US: u32 = 200;
 /// A request and its answer.
 const SDO_FRAMES: u32 = 2;
 /// An answer to every request of every node and more.
 const SDO_FRAMES_MAX: i64 = 256;
+/// One of every node and more.
+const EMCY_FRAMES_MAX: i64 = 256;
+/// An exchange in a minute at the longest cycle.
+const SDO_EVERY_MAX: i64 = 1000;
 /// 90 % of the cycle.
 const LOAD_LIMIT: u32 = 900;
 const PERCENT_TO_PER_MILLE: f64 = 10.0;
 /// Longest frame, bits.
 const LONGEST_FRAME: u32 = 135;
 const US_PER_S: u32 = 1_000_000;
+
+/// What the key may say; without it, the first that fits.
+const ORDERS: [(&str, RpdoOrder); 2] = [
+    ("after TPDOs", RpdoOrder::AfterTpdos),
+    ("after SYNC", RpdoOrder::AfterSync),
+];
 
 pub(super) fn bus(
     name: &Spanned<String>,
@@ -46,6 +56,11 @@ pub(super) fn bus(
     let guard_us = time(&bus.guard_us, "guard_us", context);
     let sdo = bus.sdo_frames.as_ref();
     let sdo_frames = sdo.map(|n| context.number::<u32>(n, "sdo_frames", 0..=SDO_FRAMES_MAX));
+    let every = bus.sdo_every.as_ref();
+    let sdo_every = every.map(|n| context.number::<u32>(n, "sdo_every", 0..=SDO_EVERY_MAX));
+    let emcy = bus.emcy_frames.as_ref();
+    let emcy_frames = emcy.map(|n| context.number::<u32>(n, "emcy_frames", 0..=EMCY_FRAMES_MAX));
+    let order = context.word(bus.rpdos.as_ref(), "rpdos", &ORDERS);
     let load_limit = match &bus.load_limit {
         Some(percent) => per_mille(percent, "load_limit", (1, 1000), context),
         None => Some(LOAD_LIMIT),
@@ -60,7 +75,11 @@ pub(super) fn bus(
             Some(us) => us?,
             None => (LONGEST_FRAME * US_PER_S).div_ceil(bit_rate),
         },
+        order: order?,
         sdo_frames: sdo_frames.unwrap_or(Some(SDO_FRAMES))?,
+        sdo_every: sdo_every.unwrap_or(Some(0))?,
+        emcy_frames: emcy_frames.unwrap_or(Some(0))?,
+        heartbeats_wait: bus.heartbeats_wait.unwrap_or(false),
         ..Demand::of(std::iter::empty(), 0, bit_rate)
     };
     Some(Bus {

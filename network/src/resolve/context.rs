@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use toml::Spanned;
 
-use crate::problem::{Place, Problems};
+use crate::problem::{Place, Problems, nearest};
 use crate::source::Source;
 
 pub(crate) struct Context<'a> {
@@ -42,7 +42,35 @@ impl Context<'_> {
         None
     }
 
-    /// The same, if the key is there.
+    /// One of the words that a key may have; the first, if the key is not there.
+    pub(crate) fn word<T: Copy>(
+        &mut self,
+        value: Option<&Spanned<String>>,
+        key: &str,
+        words: &[(&str, T)],
+    ) -> Option<T> {
+        let Some(value) = value else {
+            return words.first().map(|(_, meaning)| *meaning);
+        };
+        let found = words.iter().find(|(word, _)| *word == value.get_ref());
+        if found.is_none() {
+            let known = || words.iter().map(|(word, _)| *word);
+            let place = self.at(value);
+            let all: Vec<String> = known().map(|word| format!("\"{word}\"")).collect();
+            self.problems.error(
+                &place,
+                value.get_ref(),
+                format!("{key} must be {}", all.join(" or ")),
+                match nearest(value.get_ref(), known()) {
+                    Some(word) => format!("did you mean \"{word}\"?"),
+                    None => "write one of these, or leave it out".to_string(),
+                },
+            );
+        }
+        found.map(|(_, meaning)| *meaning)
+    }
+
+    /// A number, if the key is there.
     pub(crate) fn optional<T: TryFrom<i64>>(
         &mut self,
         value: Option<&Spanned<i64>>,

@@ -18,7 +18,9 @@ pub(super) struct Times {
     pub(super) heartbeat_ms: u16,
     pub(super) master_timeout_ms: u16,
     pub(super) sdo_timeout_ms: u32,
+    pub(super) tpdo_earliest_us: u32,
     pub(super) tpdo_latency_us: u32,
+    pub(super) sdo_latency_us: Option<(u32, u32)>,
 }
 
 /// 1020h
@@ -81,6 +83,13 @@ pub(super) fn times(device: &Device, context: &mut Context<'_>) -> Option<Times>
         Some(us) => context.number(us, "tpdo_latency_us", 0..=LATENCY_MAX_US),
         None => Some(TPDO_LATENCY_US),
     };
+    let earliest = device.tpdo_earliest_us.as_ref();
+    let most = i64::from(tpdo_latency_us.unwrap_or(0));
+    let tpdo_earliest_us = match earliest {
+        Some(us) => context.number(us, "tpdo_earliest_us", 0..=most),
+        None => Some(0),
+    };
+    let sdo_latency_us = sdo_latency(device, context);
     let sdo_timeout_ms = match &device.sdo_timeout_ms {
         Some(ms) => context.number(ms, "sdo_timeout_ms", 1..=MS_16),
         None => Some(SDO_TIMEOUT_MS),
@@ -89,8 +98,32 @@ pub(super) fn times(device: &Device, context: &mut Context<'_>) -> Option<Times>
         heartbeat_ms: heartbeat_ms?,
         master_timeout_ms: master_timeout_ms?,
         sdo_timeout_ms: sdo_timeout_ms?,
+        tpdo_earliest_us: tpdo_earliest_us?,
         tpdo_latency_us: tpdo_latency_us?,
+        sdo_latency_us: sdo_latency_us?,
     })
+}
+
+/// The soonest and the slowest answer to an SDO request. Outside: what is wrong was
+/// told; inside: nobody knows.
+fn sdo_latency(device: &Device, context: &mut Context<'_>) -> Option<Option<(u32, u32)>> {
+    let Some(spanned) = &device.sdo_latency_us else {
+        return Some(None);
+    };
+    if let [least, most] = spanned.get_ref()[..]
+        && (0..=LATENCY_MAX_US).contains(&most)
+        && (0..=most).contains(&least)
+    {
+        return Some(Some((least as u32, most as u32)));
+    }
+    let place = context.at(spanned);
+    context.problems.error(
+        &place,
+        format!("{:?}", spanned.get_ref()),
+        format!("these are the soonest and the slowest answer, up to {LATENCY_MAX_US} us"),
+        "write [soonest, slowest], for example [200, 1_000]; without it SDO is not planned",
+    );
+    None
 }
 
 /// 1F26h and 1F27h: date and time that a configured node shows in 1020h.

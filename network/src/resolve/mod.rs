@@ -17,7 +17,7 @@ use std::io;
 use crate::check;
 use crate::description::{self, Description};
 use crate::eds::Eds;
-use crate::model::{Machine, Master, Node};
+use crate::model::{Liveness, Machine, Master, Node};
 use crate::object::Direction;
 use crate::problem::{Place, Problems, nearest};
 use crate::source::Source;
@@ -53,6 +53,8 @@ pub(crate) fn machine(
         Some(count) => context.number(count, "missing_tpdos", 1..=u8::MAX.into())?,
         None => DEFAULT_MISSING_TPDOS,
     };
+    let by = description.liveness.by.as_ref();
+    let liveness = context.word(by, "by", &LIVENESS)?;
     if description.node.is_empty() {
         context.problems.error(
             &Place::file(source),
@@ -83,6 +85,7 @@ pub(crate) fn machine(
     }
     check::peripherals(description, &buses, &mut context);
     check::error_control(description, &master, &nodes, &mut context);
+    check::liveness(description, liveness, &nodes, &mut context);
     check::bit_rates(description, &files, &buses, &nodes, &mut context);
     check::configuration(description, &files, &master, &nodes, &mut context);
     let buses = check::capacity(description, buses, &master, &nodes, &mut context);
@@ -92,6 +95,7 @@ pub(crate) fn machine(
     Some(Machine {
         master,
         buses,
+        liveness,
         missing_tpdos,
         nodes,
     })
@@ -99,6 +103,9 @@ pub(crate) fn machine(
 
 /// One may fall to a bus error and one to its retransmission.
 const DEFAULT_MISSING_TPDOS: u8 = 3;
+
+const LIVENESS: [(&str, Liveness); 2] =
+    [("TPDO", Liveness::Tpdo), ("heartbeat", Liveness::Heartbeat)];
 
 fn master(
     master: &toml::Spanned<description::Master>,
@@ -204,10 +211,16 @@ fn resolve_node(
         mandatory: node.mandatory.unwrap_or(true),
         identity,
         heartbeat_ms: limits.heartbeat_ms,
+        heartbeat_in_operational: device
+            .heartbeat_in_operational
+            .as_ref()
+            .is_none_or(|on| *on.get_ref()),
         master_timeout_ms: limits.master_timeout_ms,
         sdo_timeout_ms: limits.sdo_timeout_ms,
         configured: configured?,
+        tpdo_earliest_us: limits.tpdo_earliest_us,
         tpdo_latency_us: limits.tpdo_latency_us,
+        sdo_latency_us: limits.sdo_latency_us,
         rpdos,
         tpdos,
         increments_per_turn: axis.increments_per_turn,

@@ -8,7 +8,7 @@ use super::context::Context;
 use super::find;
 use crate::description;
 use crate::eds::Eds;
-use crate::model::{Mapped, Pdo};
+use crate::model::{Mapped, Pdo, Send};
 use crate::object::{Address, DataType, Direction};
 use crate::plan::PDOS_PER_NODE;
 
@@ -95,10 +95,12 @@ fn pdo(
         return None;
     }
     let transmission = transmission(direction, described.transmission.as_ref(), context);
+    let send = send(direction, described.send.as_ref(), context);
     Some(Pdo {
         direction,
         number: parsed,
         transmission: transmission?,
+        send: send?,
         mapping: mapping?,
     })
 }
@@ -126,6 +128,28 @@ fn transmission(
         .problems
         .error(&place, code, wrong, "1 for every SYNC, 255 for on change");
     None
+}
+
+fn send(
+    direction: Direction,
+    word: Option<&Spanned<String>>,
+    context: &mut Context<'_>,
+) -> Option<Send> {
+    if let (Some(spanned), Direction::Transmit) = (word, direction) {
+        let place = context.at(spanned);
+        context.problems.error(
+            &place,
+            spanned.get_ref(),
+            "the node decides when it sends a TPDO",
+            "leave send out; transmission says when a TPDO comes",
+        );
+        return None;
+    }
+    let words = [
+        ("every cycle", Send::EveryCycle),
+        ("on change", Send::OnChange),
+    ];
+    context.word(word, "send", &words)
 }
 
 fn mapping(

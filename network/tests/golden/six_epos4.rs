@@ -20,6 +20,35 @@ pub const COMPUTE_US: u16 = 200;
 pub const RPDOS_US: u16 = 1635;
 /// Prescaler, segment 1 and segment 2 of the bit timing.
 pub const BIT_TIMING: (u16, u16, u16) = (1, 20, 3);
+/// Buses, in the order of their names.
+pub const BUSES: usize = 1;
+/// The controller of each: 1 for FDCAN1.
+pub const BUS_PERIPHERALS: [u8; BUSES] = [1];
+/// Prescaler, segment 1 and segment 2 of the bit timing of each.
+pub const BUS_BIT_TIMINGS: [(u16, u16, u16); BUSES] = [(1, 20, 3)];
+/// The bus of each axis.
+pub const AXIS_BUSES: [u8; AXES] = [0, 0, 0, 0, 0, 0];
+/// RPDOs that answer to TPDOs are handed over at the next SYNC, not when they are
+/// computed.
+pub const RPDOS_AFTER_SYNC: bool = false;
+/// So long before SYNC nothing of the master is on the wire, us.
+pub const GUARD_US: u16 = 135;
+/// Until then a frame that is handed over goes ahead of all TPDOs, us after SYNC.
+pub const AFTER_SYNC_US: [u16; BUSES] = [47];
+/// One slot in a cycle serves SDO frames, the master's heartbeat and RPDOs on change.
+pub const ONE_PLANNED: [bool; BUSES] = [false];
+/// SDO requests in operational are handed over from then on, us after SYNC,
+pub const SDO_FROM_US: [u16; BUSES] = [0];
+/// and until then; 0: none is.
+pub const SDO_UNTIL_US: [u16; BUSES] = [10000];
+/// The answer comes in the cycle after that of the request, and has its planned slot.
+pub const SDO_NEXT_CYCLE: [bool; BUSES] = [false];
+/// A drive is asked by SDO every so many cycles; 0: never.
+pub const SDO_EVERY: [u16; BUSES] = [0];
+/// The ramps of each axis are sent on change, to one axis of a bus in a cycle.
+pub const RAMPS_ON_CHANGE: [bool; AXES] = [true, true, true, true, true, true];
+/// Whether each node sends its heartbeat in operational, too.
+pub const HEARTBEATS_IN_OPERATIONAL: [bool; AXES] = [true, true, true, true, true, true];
 
 /// The motors, in the order of the axes.
 pub const MOTORS: [Motor; AXES] = [
