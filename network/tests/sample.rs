@@ -66,6 +66,24 @@ fn the_generated_network_is_the_one_of_the_library() {
     assert_eq!(generated::BIT_TIMING, (1, 20, 3));
 }
 
+/// SDO is not planned in the sample, ramps are sent on change.
+#[test]
+fn the_generated_cycle_of_the_sample() {
+    use generated::*;
+    let bus = &sample().buses[0];
+    assert_eq!((BUSES, BUS_PERIPHERALS), (1, [1]));
+    assert_eq!(BUS_BIT_TIMINGS, [BIT_TIMING]);
+    assert_eq!(AXIS_BUSES, [0; AXES]);
+    assert_eq!((RPDOS_AFTER_SYNC, GUARD_US), (false, 135));
+    // The shortest SYNC has 47 bits, and nobody knows when the TPDOs come.
+    assert_eq!(AFTER_SYNC_US, [47]);
+    assert_eq!((ONE_PLANNED, SDO_NEXT_CYCLE), ([false], [false]));
+    let until = bus.cycle_us as u16;
+    assert_eq!((SDO_FROM_US, SDO_UNTIL_US, SDO_EVERY), ([0], [until], [0]));
+    assert_eq!(RAMPS_ON_CHANGE, [true; AXES]);
+    assert_eq!(HEARTBEATS_IN_OPERATIONAL, [true; AXES]);
+}
+
 #[test]
 fn the_plan_is_that_of_the_library_write_for_write() {
     let machine = sample();
