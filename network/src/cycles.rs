@@ -4,12 +4,22 @@
 use std::ops::RangeInclusive;
 
 use crate::layout::Layout;
-use crate::model::Bus;
+use crate::model::{Bus, Machine};
 use crate::resolve::{CYCLE_MAX_US, CYCLE_MIN_US};
 
 const US_PER_MS: u32 = 1000;
 const MIN_US: u32 = CYCLE_MIN_US as u32;
 const MAX_US: u32 = CYCLE_MAX_US as u32;
+
+impl Machine {
+    /// The cycles that all buses pass their check with, in microseconds.
+    pub fn cycles(&self) -> RangeInclusive<u32> {
+        let of = |bus: &Bus| bus.cycles().into_inner();
+        let shortest = self.buses.iter().map(|bus| of(bus).0).max();
+        let longest = self.buses.iter().map(|bus| of(bus).1).min();
+        shortest.unwrap_or(MIN_US)..=longest.unwrap_or(MAX_US)
+    }
+}
 
 impl Bus {
     /// All cycles around the described one that pass the same check, in

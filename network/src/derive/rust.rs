@@ -54,20 +54,23 @@ fn write(machine: &Machine, library: &str, out: &mut String) -> std::fmt::Result
         out,
         "/// The SYNC periods (1006h) that pass the check of the description, us."
     )?;
-    let (shortest, longest) = bus.cycles().into_inner();
+    let (shortest, longest) = machine.cycles().into_inner();
     writeln!(out, "pub const SHORTEST_CYCLE_US: u32 = {shortest};")?;
     writeln!(out, "pub const LONGEST_CYCLE_US: u32 = {longest};")?;
     writeln!(
         out,
         "/// From the last TPDO of a cycle to its first RPDO, us."
     )?;
-    let compute = bus.layout.demand.compute_us;
+    let layouts = || machine.buses.iter().map(|bus| &bus.layout);
+    let compute = layouts().map(|layout| layout.demand.compute_us);
+    let compute = compute.max().unwrap_or(0);
     writeln!(out, "pub const COMPUTE_US: u16 = {compute};")?;
     writeln!(
         out,
         "/// From the first RPDO of a cycle to the end of the last and the guard, us."
     )?;
-    let rpdos = bus.layout.after_tpdos_us() - compute;
+    let rpdos = layouts().map(|layout| layout.after_tpdos_us() - layout.demand.compute_us);
+    let rpdos = rpdos.max().unwrap_or(0);
     writeln!(out, "pub const RPDOS_US: u16 = {rpdos};")?;
     writeln!(
         out,

@@ -12,12 +12,12 @@ pub const TPDO_DEADLINE_US: u16 = 5000;
 /// Cycles in a row without a TPDO after which its node counts as lost.
 pub const TPDO_MISSING_LIMIT: u8 = 3;
 /// The SYNC periods (1006h) that pass the check of the description, us.
-pub const SHORTEST_CYCLE_US: u32 = 6835;
+pub const SHORTEST_CYCLE_US: u32 = 6025;
 pub const LONGEST_CYCLE_US: u32 = 65535;
 /// From the last TPDO of a cycle to its first RPDO, us.
 pub const COMPUTE_US: u16 = 200;
 /// From the first RPDO of a cycle to the end of the last and the guard, us.
-pub const RPDOS_US: u16 = 1635;
+pub const RPDOS_US: u16 = 825;
 /// Prescaler, segment 1 and segment 2 of the bit timing.
 pub const BIT_TIMING: (u16, u16, u16) = (1, 20, 3);
 /// Buses, in the order of their names.
