@@ -28,7 +28,9 @@ mod firmware {
         println!("cargo::rustc-link-search={}", out.display());
         // Not in .cargo/config.toml: a RUSTFLAGS variable would silently replace
         // them there, and the image would link without its vector table.
-        for argument in ["--nmagic", "-Tlink.x", "-Tdefmt.x"] {
+        // Functions that are the same byte for byte are kept once: no pointers to
+        // functions are compared.
+        for argument in ["--nmagic", "-Tlink.x", "-Tdefmt.x", "--icf=all"] {
             println!("cargo::rustc-link-arg-bins={argument}");
         }
         constants(&out);
