@@ -130,37 +130,49 @@ impl Event {
 }
 
 in_words!(Event {
-    fixed {
-        Event::ResetSent => "reset communication sent, awaiting the nodes",
-        Event::StartAwaited => "every mandatory node is booted; the start has to be requested (1F82h)",
-        Event::StartSent => "NMT start sent",
-        Event::StartLeft => "the nodes are to be started by request (1F82h)",
-        Event::NetworkReady => "network ready: every node is operational",
-        Event::NetworkDown => "network not ready: a mandatory node is not operational",
-        Event::NetworkFailed => "network not started: a mandatory node failed",
-        Event::NetworkStopped => "all nodes stopped after the error of a mandatory node",
-        Event::BusRestarted => "controller restarted, silent until the drives are at rest",
-        Event::Scanning => "not every node booted: looking for nodes without node-ID (LSS)",
-    }
-    node {
-        Event::BootUp(node) => node "boot-up",
-        Event::Identified(node) => node "is the expected device",
-        Event::Configured(node) => node "configured",
-        Event::Ready(node) => node "ready to start",
-        Event::LeftRunning(node) => node "was operational already and is left running (boot status L)",
-        Event::NotListed(node) => node "not in the list of this master (1F81h), left alone (boot status A)",
-        Event::Operational(node) => node "operational",
-        Event::NodeLost(node) => node "lost, to be booted again",
-        Event::NodeBack(node) => node "is back",
-        Event::IdGiven { node, stored: true } => node "found by its serial number, node-ID given",
-        Event::IdGiven { node, stored: false } => node "found by its serial number, node-ID given, but the node does not store it",
-        Event::IdUnanswered(node) => node "found by its serial number, did not answer to its node-ID; reset the board to try again",
-    }
-    Event::Configuring { node, done, total } => ("node {}: configuring, {} of {} writes", node, done, total),
+    Event::ResetSent => ("reset communication sent, awaiting the nodes"),
+    Event::BootUp(node) => ("node {}: boot-up", node),
+    Event::Identified(node) => ("node {}: is the expected device", node),
+    Event::Configuring { node, done, total } => (
+        "node {}: configuring, {} of {} writes", node, done, total
+    ),
+    Event::Configured(node) => ("node {}: configured", node),
+    Event::Ready(node) => ("node {}: ready to start", node),
+    Event::LeftRunning(node) => (
+        "node {}: was operational already and is left running (boot status L)", node
+    ),
+    Event::NotListed(node) => (
+        "node {}: not in the list of this master (1F81h), left alone (boot status A)", node
+    ),
     Event::Failed(node, failure) => ("node {}: {}", node, failure),
+    Event::StartAwaited => (
+        "every mandatory node is booted; the start has to be requested (1F82h)"
+    ),
+    Event::StartSent => ("NMT start sent"),
+    Event::StartLeft => ("the nodes are to be started by request (1F82h)"),
+    Event::Operational(node) => ("node {}: operational", node),
+    Event::NodeLost(node) => ("node {}: lost, to be booted again", node),
+    Event::NodeBack(node) => ("node {}: is back", node),
+    Event::NetworkReady => ("network ready: every node is operational"),
+    Event::NetworkDown => ("network not ready: a mandatory node is not operational"),
+    Event::NetworkFailed => ("network not started: a mandatory node failed"),
+    Event::NetworkStopped => ("all nodes stopped after the error of a mandatory node"),
     Event::BusOff { pause_ms } => ("bus-off: restarting the controller in {} ms", pause_ms),
-    Event::IdRefused { node, error, specific } => ("node {}: found by its serial number, refused its node-ID with error {}, specific error {}",
-        node, error, specific),
-    Event::Stranger(LssAddress { vendor, product, revision, serial }) => ("a node stays without node-ID, since the network does not name it or it refused: vendor {:08X}h, product {:08X}h, revision {:08X}h, serial {:08X}h",
-        vendor, product, revision, serial),
+    Event::BusRestarted => ("controller restarted, silent until the drives are at rest"),
+    Event::Scanning => ("not every node booted: looking for nodes without node-ID (LSS)"),
+    Event::IdGiven { node, stored: true } => (
+        "node {}: found by its serial number, node-ID given", node
+    ),
+    Event::IdGiven { node, stored: false } => (
+        "node {}: found by its serial number, node-ID given, but the node does not store it", node
+    ),
+    Event::IdRefused { node, error, specific } => (
+        "node {}: found by its serial number, refused its node-ID with error {}, specific error {}", node, error, specific
+    ),
+    Event::IdUnanswered(node) => (
+        "node {}: found by its serial number, did not answer to its node-ID; reset the board to try again", node
+    ),
+    Event::Stranger(LssAddress { vendor, product, revision, serial }) => (
+        "a node stays without node-ID, since the network does not name it or it refused: vendor {:08X}h, product {:08X}h, revision {:08X}h, serial {:08X}h", vendor, product, revision, serial
+    ),
 });

@@ -1,6 +1,6 @@
 //! SDO abort codes (CiA 301, 7.2.4.3.17).
 
-use core::fmt;
+use crate::words::in_words;
 
 /// The reason for which an SDO transfer was aborted (CiA 301, 7.2.4.3.17,
 /// table 22). Codes that the standard does not know survive a round trip.
@@ -26,16 +26,10 @@ macro_rules! abort_codes {
             }
         }
 
-        #[cfg(feature = "defmt")]
-        impl defmt::Format for AbortCode {
-            fn format(&self, f: defmt::Formatter<'_>) {
-                let words = match self.0 {
-                    $($code => defmt::intern!($words),)*
-                    _ => defmt::intern!("code of the manufacturer"),
-                };
-                defmt::write!(f, "{=u32:08X}h ({=istr})", self.0, words)
-            }
-        }
+        in_words!(Meaning by Meaning::place {
+            $(Meaning(AbortCode($code)) => ($words),)*
+            _ => ("code of the manufacturer"),
+        });
     };
 }
 
@@ -81,12 +75,21 @@ abort_codes! {
     EPOS4_NMT_STATE = 0x0F00_FFC0, "device is in the wrong NMT state (EPOS4)";
 }
 
-impl fmt::Display for AbortCode {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.meaning() {
-            Some(words) => write!(f, "{:08X}h ({words})", self.0),
-            None => write!(f, "{:08X}h (code of the manufacturer)", self.0),
-        }
+in_words!(AbortCode {
+    code => ("{:08X}h ({})", code.0, Meaning(code)),
+});
+
+/// What a code says.
+#[derive(Clone, Copy)]
+struct Meaning(AbortCode);
+
+impl Meaning {
+    /// Its place in [`AbortCode::KNOWN`], or behind that.
+    #[cfg(feature = "defmt")]
+    fn place(&self) -> u8 {
+        let mut known = AbortCode::KNOWN.iter();
+        let place = known.position(|code| *code == self.0);
+        place.unwrap_or(AbortCode::KNOWN.len()) as u8
     }
 }
 
