@@ -1,6 +1,6 @@
 //! The identifiers of CANopen as types: a value that exists is a valid one.
 
-use core::fmt;
+use crate::words::in_words;
 use embedded_can::StandardId;
 
 /// A node-ID, 1..=127 (CiA 301, 7.2.1).
@@ -34,18 +34,7 @@ impl NodeId {
     }
 }
 
-#[cfg(feature = "defmt")]
-impl defmt::Format for NodeId {
-    fn format(&self, f: defmt::Formatter<'_>) {
-        defmt::write!(f, "{=u8}", self.0);
-    }
-}
-
-impl fmt::Display for NodeId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", self.0)
-    }
-}
+in_words!(NodeId { id => ("{}", id.0), });
 
 /// A communication object identifier: an 11-bit CAN identifier as CANopen uses
 /// it (CiA 301, 7.3.5). Extended identifiers are not used by this master.
@@ -129,18 +118,7 @@ impl From<CobId> for StandardId {
     }
 }
 
-#[cfg(feature = "defmt")]
-impl defmt::Format for CobId {
-    fn format(&self, f: defmt::Formatter<'_>) {
-        defmt::write!(f, "{=u16:03X}h", self.0);
-    }
-}
-
-impl fmt::Display for CobId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:03X}h", self.0)
-    }
-}
+in_words!(CobId { id => ("{:03X}h", id.0), });
 
 /// The function codes of the predefined connection set that carry a node-ID
 /// (CiA 301, 7.3.5). RPDO and TPDO are seen from the node.
@@ -208,35 +186,13 @@ impl FunctionCode {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Index(pub u16);
 
-#[cfg(feature = "defmt")]
-impl defmt::Format for Index {
-    fn format(&self, f: defmt::Formatter<'_>) {
-        defmt::write!(f, "{=u16:04X}h", self.0);
-    }
-}
-
-impl fmt::Display for Index {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:04X}h", self.0)
-    }
-}
+in_words!(Index { index => ("{:04X}h", index.0), });
 
 /// A sub-index of the object dictionary (CiA 301, 7.4.1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct SubIndex(pub u8);
 
-#[cfg(feature = "defmt")]
-impl defmt::Format for SubIndex {
-    fn format(&self, f: defmt::Formatter<'_>) {
-        defmt::write!(f, "{=u8:02X}h", self.0);
-    }
-}
-
-impl fmt::Display for SubIndex {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:02X}h", self.0)
-    }
-}
+in_words!(SubIndex { sub => ("{:02X}h", sub.0), });
 
 /// Index and sub-index together: one entry of an object dictionary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -257,18 +213,7 @@ impl Address {
     }
 }
 
-#[cfg(feature = "defmt")]
-impl defmt::Format for Address {
-    fn format(&self, f: defmt::Formatter<'_>) {
-        defmt::write!(f, "{=u16:04X}h:{=u8:02X}", self.index.0, self.sub.0);
-    }
-}
-
-impl fmt::Display for Address {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:04X}h:{:02X}", self.index.0, self.sub.0)
-    }
-}
+in_words!(Address { at => ("{:04X}h:{:02X}", at.index.0, at.sub.0), });
 
 #[cfg(test)]
 mod tests {

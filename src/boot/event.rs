@@ -160,11 +160,8 @@ in_words!(Event {
     Event::BusOff { pause_ms } => ("bus-off: restarting the controller in {} ms", pause_ms),
     Event::BusRestarted => ("controller restarted, silent until the drives are at rest"),
     Event::Scanning => ("not every node booted: looking for nodes without node-ID (LSS)"),
-    Event::IdGiven { node, stored: true } => (
-        "node {}: found by its serial number, node-ID given", node
-    ),
-    Event::IdGiven { node, stored: false } => (
-        "node {}: found by its serial number, node-ID given, but the node does not store it", node
+    Event::IdGiven { node, stored } => (
+        "node {}: found by its serial number, node-ID given{}", node, Kept(stored)
     ),
     Event::IdRefused { node, error, specific } => (
         "node {}: found by its serial number, refused its node-ID with error {}, specific error {}", node, error, specific
@@ -172,7 +169,16 @@ in_words!(Event {
     Event::IdUnanswered(node) => (
         "node {}: found by its serial number, did not answer to its node-ID; reset the board to try again", node
     ),
-    Event::Stranger(LssAddress { vendor, product, revision, serial }) => (
-        "a node stays without node-ID, since the network does not name it or it refused: vendor {:08X}h, product {:08X}h, revision {:08X}h, serial {:08X}h", vendor, product, revision, serial
+    Event::Stranger(address) => (
+        "a node stays without node-ID, since the network does not name it or it refused: {}", address
     ),
+});
+
+/// Whether a node stores its node-ID.
+#[derive(Clone, Copy)]
+struct Kept(bool);
+
+in_words!(Kept {
+    Kept(true) => (""),
+    Kept(false) => (", but the node does not store it"),
 });

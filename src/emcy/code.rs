@@ -1,7 +1,7 @@
 //! Emergency error codes: CiA 301, 7.2.7.1, table 26; CiA 402-2; EPOS4.
 
 use super::texts;
-use core::fmt;
+use crate::words::in_words;
 
 /// How the master takes an emergency.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,20 +69,9 @@ impl EmcyCode {
     }
 }
 
-impl fmt::Display for EmcyCode {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let text = self.text();
-        write!(f, "{:04X}h ({text})", self.0)
-    }
-}
-
-#[cfg(feature = "defmt")]
-impl defmt::Format for EmcyCode {
-    fn format(&self, f: defmt::Formatter<'_>) {
-        let text = self.text();
-        defmt::write!(f, "{=u16:04X}h ({=str})", self.0, text)
-    }
-}
+in_words!(EmcyCode {
+    code => ("{:04X}h ({})", code.0, code.text()),
+});
 
 #[cfg(test)]
 mod tests {

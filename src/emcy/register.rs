@@ -1,5 +1,6 @@
 //! The error register (CiA 301, 7.5.2.2).
 
+use crate::words::in_words;
 use core::fmt;
 
 /// The error register, object 1001h (CiA 301, 7.5.2.2).
@@ -24,17 +25,6 @@ impl ErrorRegister {
     /// As the manufacturer has it.
     pub const MANUFACTURER: ErrorRegister = ErrorRegister(0x80);
 
-    const NAMES: [(ErrorRegister, &'static str); 8] = [
-        (ErrorRegister::GENERIC, "generic"),
-        (ErrorRegister::CURRENT, "current"),
-        (ErrorRegister::VOLTAGE, "voltage"),
-        (ErrorRegister::TEMPERATURE, "temperature"),
-        (ErrorRegister::COMMUNICATION, "communication"),
-        (ErrorRegister::PROFILE, "device profile"),
-        (ErrorRegister::RESERVED, "reserved"),
-        (ErrorRegister::MANUFACTURER, "manufacturer"),
-    ];
-
     /// Whether all bits of `other` are set.
     pub const fn contains(self, other: ErrorRegister) -> bool {
         self.0 & other.0 == other.0
@@ -44,61 +34,63 @@ impl ErrorRegister {
     pub const fn union(self, other: ErrorRegister) -> ErrorRegister {
         ErrorRegister(self.0 | other.0)
     }
+
+    /// The bits that are set.
+    fn bits(self) -> impl Iterator<Item = Bit> {
+        let all = (0..u8::BITS as u8).map(Bit);
+        all.filter(move |bit| self.0 & 1 << bit.0 != 0)
+    }
 }
 
 impl fmt::Display for ErrorRegister {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.0 == 0 {
-            return f.write_str("no error");
+        let mut separator = "";
+        for bit in self.bits() {
+            write!(f, "{separator}{bit}")?;
+            separator = ", ";
         }
-        let set = ErrorRegister::NAMES
-            .iter()
-            .filter(|(bit, _)| self.contains(*bit));
-        for (i, (_, name)) in set.enumerate() {
-            let separator = if i == 0 { "" } else { ", " };
-            write!(f, "{separator}{name}")?;
+        match separator {
+            "" => f.write_str("no error"),
+            _ => Ok(()),
         }
-        Ok(())
     }
 }
 
 #[cfg(feature = "defmt")]
 impl defmt::Format for ErrorRegister {
     fn format(&self, f: defmt::Formatter<'_>) {
-        if self.0 == 0 {
+        let mut any = false;
+        for bit in self.bits() {
+            if any {
+                defmt::write!(f, ", ");
+            }
+            any = true;
+            defmt::write!(f, "{}", bit);
+        }
+        if !any {
             defmt::write!(f, "no error");
-        } else {
-            defmt::write!(f, "{}", BitsFrom(self.0, 0));
         }
     }
 }
 
-/// The set bits of a register from the one with this number on.
-#[cfg(feature = "defmt")]
-struct BitsFrom(u8, u8);
+/// A bit by its number.
+#[derive(Clone, Copy)]
+struct Bit(u8);
 
-#[cfg(feature = "defmt")]
-impl defmt::Format for BitsFrom {
-    fn format(&self, f: defmt::Formatter<'_>) {
-        let BitsFrom(register, first) = *self;
-        let Some(bit) = (first..8).find(|bit| register & (1 << bit) != 0) else {
-            return defmt::write!(f, "");
-        };
-        let name = match bit {
-            0 => defmt::intern!("generic"),
-            1 => defmt::intern!("current"),
-            2 => defmt::intern!("voltage"),
-            3 => defmt::intern!("temperature"),
-            4 => defmt::intern!("communication"),
-            5 => defmt::intern!("device profile"),
-            6 => defmt::intern!("reserved"),
-            _ => defmt::intern!("manufacturer"),
-        };
-        let rest = BitsFrom(register, bit + 1);
-        if register >> bit > 1 {
-            defmt::write!(f, "{=istr}, {}", name, rest);
-        } else {
-            defmt::write!(f, "{=istr}", name);
-        }
+impl Bit {
+    #[cfg(feature = "defmt")]
+    const fn number(&self) -> u8 {
+        self.0
     }
 }
+
+in_words!(Bit by Bit::number {
+    Bit(0) => ("generic"),
+    Bit(1) => ("current"),
+    Bit(2) => ("voltage"),
+    Bit(3) => ("temperature"),
+    Bit(4) => ("communication"),
+    Bit(5) => ("device profile"),
+    Bit(6) => ("reserved"),
+    _ => ("manufacturer"),
+});

@@ -33,16 +33,13 @@ impl<'a> Configurator<'a> {
         local: task::LocalResources<'a>,
         shared: task::SharedResources<'a>,
     ) -> Configurator<'a> {
-        log::started(*local.reset_cause);
-        defmt::info!(
-            "silent for {=u32} ms, so that drives left running come to rest",
-            NETWORK.master.silence.as_millis()
+        log::started(
+            *local.reset_cause,
+            NETWORK.master.silence.as_millis(),
+            local.store.is_some(),
         );
         if *local.reset_cause == ResetCause::Watchdog {
             local.own.device.raise(MasterError::Watchdog);
-        }
-        if local.store.is_none() {
-            defmt::warn!("settings are not stored (1010h): set option bit DBANK, then flash again");
         }
         let mut configurator = Configurator {
             local,

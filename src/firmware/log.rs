@@ -10,8 +10,8 @@ use canmaster::{
     motion::{FaultCause, GroupEvent, GroupState},
     network::{Network, Node},
 };
+use canmaster_words::in_log;
 use core::sync::atomic::{AtomicU32, Ordering};
-use defmt::info;
 use nucleo_g474re::{can::ErrorState, reset_cause::ResetCause};
 
 /// Milliseconds since the start, for the log; `network` counts them.
@@ -31,7 +31,10 @@ enum Level {
 /// A line of the log. Each kind is formatted in one place for all levels.
 #[derive(Clone, Copy)]
 enum Line<'a> {
-    Words(defmt::Str),
+    Started(ResetCause),
+    Silent(u32),
+    NotStored,
+    Controller(ErrorState),
     Counts(&'a Counts),
     Boot(&'a Event),
     Notice(&'a Notice),
@@ -45,43 +48,70 @@ enum Line<'a> {
     AxisFault(&'a Node, &'a FaultCause),
 }
 
-impl defmt::Format for Line<'_> {
-    fn format(&self, f: defmt::Formatter<'_>) {
-        match *self {
-            Line::Words(words) => defmt::write!(f, "{=istr}", words),
-            Line::Counts(counts) => defmt::write!(
-                f,
-                "so far: {=u32} SYNC not sent, {=u32} RPDO sent late or not, {=u32} cycles overrun, {=u32} frames not queued, {=u32} receive overruns, {=u32} receive queue full, {=u32} TPDO too short, {=u32} log lines lost",
-                counts.sync_not_sent,
-                counts.rpdo_replaced,
-                counts.cycle_overruns,
-                counts.tx_overflows,
-                counts.rx_overruns,
-                counts.rx_queue_full,
-                counts.tpdo_length,
-                counts.log_full,
-            ),
-            Line::Boot(event) => event.format(f),
-            Line::Notice(notice) => notice.format(f),
-            Line::Foreign(notice) => {
-                defmt::write!(f, "{}: it is not in the network description", *notice);
-            }
-            Line::Advised(notice) => defmt::write!(f, "{}; {}", *notice, notice.advice()),
-            Line::Group(event) => event.format(f),
-            Line::Standby(event) => {
-                defmt::write!(f, "{}: press B1 to start the motion", *event);
-            }
-            Line::Faulted(event) => defmt::write!(
-                f,
-                "{}: a lost node is booted again by itself, else reset the node (1F82h) or the board",
-                *event
-            ),
-            Line::AxisFault(node, cause) => {
-                defmt::write!(f, "node {} ({=str}): {}", node.id, node.name, *cause);
-            }
-        }
-    }
-}
+in_log!(Line<'_> {
+    Line::Started(cause) => (
+        "canmaster {}, started by: {}", env!("CARGO_PKG_VERSION"), Start(cause)
+    ),
+    Line::Silent(ms) => ("silent for {} ms, so that drives left running come to rest", ms),
+    Line::NotStored => (
+        "settings are not stored (1010h): set option bit DBANK, then flash again"
+    ),
+    Line::Controller(state) => ("{}", Controller(state)),
+    Line::Counts(counts) => (
+        "so far: {} SYNC not sent, {} RPDO sent late or not, {} cycles overrun, {} frames not queued, {} receive overruns, {} receive queue full, {} TPDO too short, {} log lines lost",
+        counts.sync_not_sent,
+        counts.rpdo_replaced,
+        counts.cycle_overruns,
+        counts.tx_overflows,
+        counts.rx_overruns,
+        counts.rx_queue_full,
+        counts.tpdo_length,
+        counts.log_full
+    ),
+    Line::Boot(event) => ("{}", *event),
+    Line::Notice(notice) => ("{}", *notice),
+    Line::Foreign(notice) => ("{}: it is not in the network description", *notice),
+    Line::Advised(notice) => ("{}; {}", *notice, notice.advice()),
+    Line::Group(event) => ("{}", *event),
+    Line::Standby(event) => ("{}: press B1 to start the motion", *event),
+    Line::Faulted(event) => (
+        "{}: a lost node is booted again by itself, else reset the node (1F82h) or the board",
+        *event
+    ),
+    Line::AxisFault(node, cause) => ("node {} ({}): {}", node.id, node.name, *cause),
+});
+
+/// Why the board started.
+#[derive(Clone, Copy)]
+struct Start(ResetCause);
+
+in_log!(Start {
+    Start(ResetCause::Power) => ("power-on or brown-out"),
+    Start(ResetCause::Pin) => ("reset pin"),
+    Start(ResetCause::Watchdog) => ("watchdog: a task hung, or the firmware panicked"),
+    Start(ResetCause::WindowWatchdog) => ("window watchdog"),
+    Start(ResetCause::Software) => ("software"),
+    Start(ResetCause::LowPower) => ("low-power mode"),
+    Start(ResetCause::OptionBytes) => ("option bytes loaded"),
+    Start(ResetCause::Unknown) => ("unknown"),
+});
+
+/// What the state of the CAN controller means.
+#[derive(Clone, Copy)]
+struct Controller(ErrorState);
+
+in_log!(Controller {
+    Controller(ErrorState::Active) => ("CAN controller error active again"),
+    Controller(ErrorState::Warning) => (
+        "CAN error counter at the warning limit: check wiring and termination"
+    ),
+    Controller(ErrorState::Passive) => (
+        "CAN controller error passive: is any other node on the bus, and the bus terminated?"
+    ),
+    Controller(ErrorState::BusOff) => (
+        "CAN controller bus-off: check CAN_H and CAN_L for a short or exchanged wires, the termination, and the bit rate of every node"
+    ),
+});
 
 #[inline(never)]
 fn write(level: Level, line: Line<'_>) {
@@ -93,23 +123,14 @@ fn write(level: Level, line: Line<'_>) {
     }
 }
 
-/// The first line.
-pub(crate) fn started(cause: ResetCause) {
-    let cause = match cause {
-        ResetCause::Power => defmt::intern!("power-on or brown-out"),
-        ResetCause::Pin => defmt::intern!("reset pin"),
-        ResetCause::Watchdog => defmt::intern!("watchdog: a task hung, or the firmware panicked"),
-        ResetCause::WindowWatchdog => defmt::intern!("window watchdog"),
-        ResetCause::Software => defmt::intern!("software"),
-        ResetCause::LowPower => defmt::intern!("low-power mode"),
-        ResetCause::OptionBytes => defmt::intern!("option bytes loaded"),
-        ResetCause::Unknown => defmt::intern!("unknown"),
-    };
-    info!(
-        "canmaster {=str}, started by: {=istr}",
-        env!("CARGO_PKG_VERSION"),
-        cause
-    );
+/// The first lines: why the board started, how long it is silent, and whether its
+/// settings are kept.
+pub(crate) fn started(cause: ResetCause, silence_ms: u32, stored: bool) {
+    write(Level::Info, Line::Started(cause));
+    write(Level::Info, Line::Silent(silence_ms));
+    if !stored {
+        write(Level::Warning, Line::NotStored);
+    }
 }
 
 /// What `network` has to say.
@@ -177,33 +198,19 @@ impl Log {
     /// What `network` had to say.
     #[inline(never)]
     pub(crate) fn news(&mut self, news: &News) {
-        let (level, words) = match news {
+        let (level, line) = match news {
             News::Node(report) => return self.report(report),
-            News::Counts(counts) => return write(Level::Warning, Line::Counts(counts)),
-            News::ErrorState(ErrorState::BusOff) => (
-                self.fault(),
-                defmt::intern!(
-                    "CAN controller bus-off: check CAN_H and CAN_L for a short or exchanged wires, the termination, and the bit rate of every node"
-                ),
-            ),
-            News::ErrorState(ErrorState::Passive) => (
-                Level::Warning,
-                defmt::intern!(
-                    "CAN controller error passive: is any other node on the bus, and the bus terminated?"
-                ),
-            ),
-            News::ErrorState(ErrorState::Warning) => (
-                Level::Warning,
-                defmt::intern!(
-                    "CAN error counter at the warning limit: check wiring and termination"
-                ),
-            ),
-            News::ErrorState(ErrorState::Active) => (
-                Level::Info,
-                defmt::intern!("CAN controller error active again"),
-            ),
+            News::Counts(counts) => (Level::Warning, Line::Counts(counts)),
+            News::ErrorState(state) => {
+                let level = match state {
+                    ErrorState::BusOff => self.fault(),
+                    ErrorState::Passive | ErrorState::Warning => Level::Warning,
+                    ErrorState::Active => Level::Info,
+                };
+                (level, Line::Controller(*state))
+            }
         };
-        write(level, Line::Words(words));
+        write(level, line);
     }
 
     fn report(&mut self, report: &Report) {

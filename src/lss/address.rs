@@ -1,6 +1,6 @@
 //! The LSS address of a node (CiA 305, 3.2).
 
-use core::fmt;
+use crate::words::in_words;
 
 /// One of the four numbers of an LSS address.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -38,7 +38,6 @@ impl Part {
 
 /// What tells a node from every other: the identity object 1018h.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LssAddress {
     /// 1018h:01
     pub vendor: u32,
@@ -74,12 +73,9 @@ impl From<[u32; 4]> for LssAddress {
     }
 }
 
-impl fmt::Display for LssAddress {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "vendor {:08X}h, product {:08X}h, revision {:08X}h, serial {:08X}h",
-            self.vendor, self.product, self.revision, self.serial
-        )
-    }
-}
+in_words!(LssAddress {
+    LssAddress { vendor, product, revision, serial } => (
+        "vendor {:08X}h, product {:08X}h, revision {:08X}h, serial {:08X}h",
+        vendor, product, revision, serial
+    ),
+});

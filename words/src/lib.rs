@@ -19,11 +19,22 @@ use quote::quote;
 /// function { .. })` has `fn(&Type) -> u8` do it: it counts the patterns from 0.
 #[proc_macro]
 pub fn in_words(input: proc_macro::TokenStream) -> proc_macro::TokenStream {
-    match Words::read(input.into()) {
-        Ok(words) => words.implement(),
-        Err(error) => quote!(compile_error!(#error);),
-    }
-    .into()
+    let both = Words::read(input.into()).and_then(|words| {
+        let (display, format) = (words.display(), words.format()?);
+        Ok(quote!(#display #[cfg(feature = "defmt")] #format))
+    });
+    or_error(both)
+}
+
+/// `defmt::Format` alone, as [`in_words!`] makes it: for what only goes into the log.
+#[proc_macro]
+pub fn in_log(input: proc_macro::TokenStream) -> proc_macro::TokenStream {
+    or_error(Words::read(input.into()).and_then(|words| words.format()))
+}
+
+fn or_error(made: Result<TokenStream>) -> proc_macro::TokenStream {
+    made.unwrap_or_else(|error| quote!(compile_error!(#error);))
+        .into()
 }
 
 /// What stands in the parentheses of the macro.
@@ -59,9 +70,9 @@ impl Words {
         })
     }
 
-    fn implement(&self) -> TokenStream {
+    fn display(&self) -> TokenStream {
         let Words { name, lines, .. } = self;
-        let display = lines.iter().map(|line| {
+        let arms = lines.iter().map(|line| {
             let Line {
                 pattern,
                 words,
@@ -69,33 +80,20 @@ impl Words {
             } = line;
             quote!(#pattern => write!(f, #words #(, #values)*),)
         });
-        let format = match self.format() {
-            Ok(format) => format,
-            Err(error) => quote!(compile_error!(#error);),
-        };
         quote! {
             impl core::fmt::Display for #name {
                 fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
                     match *self {
-                        #(#display)*
+                        #(#arms)*
                     }
                 }
-            }
-
-            #[cfg(feature = "defmt")]
-            impl defmt::Format for #name {
-                fn format(&self, f: defmt::Formatter<'_>) {
-                    defmt::write!(f, "{}", self);
-                }
-
-                #format
             }
         }
     }
 
-    /// The two hidden functions that the derive makes, too: one string with `|`
-    /// between the variants; the variant's number, unless there is one alone, and
-    /// its values.
+    /// With the two hidden functions that the derive makes, too: one string with
+    /// `|` between the variants; the variant's number, unless there is one alone,
+    /// and its values.
     fn format(&self) -> Result<TokenStream> {
         let numbers = (0..=u8::MAX).map(Literal::u8_suffixed);
         let mut all = Vec::new();
@@ -125,16 +123,23 @@ impl Words {
         if written.len() < self.lines.len() {
             written.push(quote!(_ => {}));
         }
+        let name = &self.name;
         Ok(quote! {
-            fn _format_tag() -> defmt::Str {
-                defmt::intern!(#all)
-            }
+            impl defmt::Format for #name {
+                fn format(&self, f: defmt::Formatter<'_>) {
+                    defmt::write!(f, "{}", self);
+                }
 
-            #[allow(unused_variables, reason = "the number alone wants no values")]
-            fn _format_data(&self) {
-                #place
-                match *self {
-                    #(#written)*
+                fn _format_tag() -> defmt::Str {
+                    defmt::intern!(#all)
+                }
+
+                #[allow(unused_variables, reason = "the number alone wants no values")]
+                fn _format_data(&self) {
+                    #place
+                    match *self {
+                        #(#written)*
+                    }
                 }
             }
         })
