@@ -17,6 +17,9 @@ type Step = (&'static str, fn() -> Result<()>);
 /// The crate that exists for the target only.
 const BOARD_CRATE: &str = "nucleo-g474re";
 
+/// What `test` and `ci` look at of each scenario of `bench realtime`, seconds.
+const REALTIME_S: f64 = 3.0;
+
 /// Name of the step that runs them.
 const TESTS: &str = "tests";
 
@@ -25,6 +28,7 @@ pub(crate) fn test(options: &TestOptions) -> Result<ExitCode> {
     tests(&options.args)?;
     if options.args.is_empty() {
         networks::four()?;
+        benched(Bench::Realtime)?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -44,7 +48,7 @@ fn tests(args: &[String]) -> Result<()> {
 /// `cargo xtask ci`: everything that has to pass, in the order of how soon it
 /// fails.
 pub(crate) fn command(options: &CiOptions) -> Result<ExitCode> {
-    let steps: [Step; 12] = [
+    let steps: [Step; 13] = [
         ("format", format),
         ("lints, host", lints_host),
         ("lints, board", lints_target),
@@ -54,6 +58,7 @@ pub(crate) fn command(options: &CiOptions) -> Result<ExitCode> {
         ("one run", one_run),
         ("bench startup", || benched(Bench::Startup)),
         ("bench sdo", || benched(Bench::Sdo)),
+        ("bench realtime", || benched(Bench::Realtime)),
         ("other tools", interop::tests),
         ("documentation", documentation),
         ("conformance table", conformance::check),
@@ -134,6 +139,9 @@ fn benched(bench: Bench) -> Result<()> {
     let options = BenchOptions {
         bench,
         seed: 1,
+        scenario: None,
+        seconds: REALTIME_S,
+        seeds: 1,
         json: false,
     };
     if bench::command(&options)? != ExitCode::SUCCESS {

@@ -217,6 +217,15 @@ pub(crate) struct BenchOptions {
     /// Seed of everything that is drawn at random
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub(crate) seed: u64,
+    /// Of `realtime`: only this scenario [default: all of them]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) scenario: Option<String>,
+    /// Of `realtime`: simulated seconds of motion that are looked at
+    #[arg(long, value_name = "S", default_value = "30", value_parser = seconds)]
+    pub(crate) seconds: f64,
+    /// Of `realtime`: how many seeds, from --seed on
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    pub(crate) seeds: u64,
     /// One JSON object on standard output and nothing else there
     #[arg(long)]
     pub(crate) json: bool,
@@ -231,6 +240,8 @@ pub(crate) enum Bench {
     Sdo,
     /// How many cycles the steps of the axes take, in each mode
     Motion,
+    /// Whether the cycle holds at 2 ms and 1 ms, and how even the SYNC is
+    Realtime,
 }
 
 /// Severities as they are typed.

@@ -30,6 +30,9 @@ fn bad_input_ends_with_usage_and_exit_code_two() {
         &["bench"],
         &["bench", "fast"],
         &["bench", "sdo", "--seed", "x"],
+        &["bench", "realtime", "--scenario", "ten_buses"],
+        &["bench", "realtime", "--seeds", "0"],
+        &["bench", "realtime", "--seconds", "0"],
         &["fly"],
         &[],
     ] {

@@ -253,6 +253,16 @@ pub enum DriveFault {
         /// Until when; `None`: for ever.
         until: Option<Time>,
     },
+    /// It warns of an overload (FF01h) and takes that back, again and again, at
+    /// SYNCs that it counts while it is operational.
+    Warnings {
+        /// So many SYNCs from one warning to the next, at least 2.
+        every: u32,
+        /// The first comes at this one, counted from 0.
+        turn: u32,
+        /// From the SYNC to the EMCY, and from the next SYNC to that with code 0.
+        delay: Spread,
+    },
     /// An error occurs in the drive: EMCY and reaction as its code has them.
     Error {
         /// When.

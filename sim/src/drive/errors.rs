@@ -44,6 +44,8 @@ pub const NEGATIVE_LIMIT: u16 = 0x8A80;
 pub const POSITIVE_LIMIT: u16 = 0x8A81;
 /// Software position limit (8A82h).
 pub const SOFTWARE_LIMIT: u16 = 0x8A82;
+/// Overload: a warning (FF01h).
+pub const OVERLOAD: u16 = 0xFF01;
 /// Safe torque off (8A88h).
 pub const STO: u16 = 0x8A88;
 
@@ -98,7 +100,7 @@ const TABLE: &[Row] = &[
         Reaction::FaultReaction,
     ),
     (STO, STO, 0x01, Reaction::Disable),
-    (0xFF01, 0xFF01, 0x00, Reaction::Warning),
+    (OVERLOAD, OVERLOAD, 0x00, Reaction::Warning),
     (0xFF02, 0xFF02, 0x00, Reaction::Warning),
     (0xFF0B, 0xFF0B, 0x01, Reaction::Disable),
     (0xFF10, 0xFF10, 0x20, Reaction::FaultReaction),

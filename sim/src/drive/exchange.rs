@@ -118,6 +118,7 @@ impl Drive {
         if !self.nmt.allows(Service::Pdo) {
             return;
         }
+        self.warn();
         let delay = self.config.tpdo_delay.draw(&mut self.random);
         let at = self.now + self.clock.span(delay);
         let sampled: Vec<_> = self

@@ -2,6 +2,7 @@
 
 use super::cia402::State;
 use super::config::{DriveFault, Trouble};
+use super::warnings::Warnings;
 use super::{Drive, Job, Planned, errors};
 use crate::time::Time;
 use canmaster::id::Address;
@@ -77,6 +78,9 @@ impl Drive {
             | DriveFault::ControlwordIgnored { .. }
             | DriveFault::HeartbeatLost { .. }
             | DriveFault::TpdosLost { .. } => {}
+            DriveFault::Warnings { every, turn, delay } => {
+                self.warnings = Some(Warnings::new(every, turn, delay));
+            }
         }
     }
 

@@ -44,6 +44,7 @@ pub mod test_data;
 #[cfg(test)]
 mod tests;
 pub mod travel;
+mod warnings;
 
 pub use config::{DriveConfig, DriveFault, Identity, Spread, Trouble};
 pub use mangle::SdoWrong;
@@ -68,6 +69,7 @@ use random::Random;
 use service::SdoService;
 use servo::Servo;
 use test_data::TestData;
+use warnings::Warnings;
 
 /// Microseconds in a second.
 const US_PER_S: f64 = 1e6;
@@ -147,6 +149,7 @@ pub struct Drive {
     last_emcy: Option<u16>,
     moved_at: Option<Time>,
     samples: Option<Vec<Sample>>,
+    warnings: Option<Warnings>,
 }
 
 impl Drive {
@@ -185,6 +188,7 @@ impl Drive {
             last_emcy: None,
             moved_at: None,
             samples: None,
+            warnings: None,
             config,
         };
         drive.plan_life();

@@ -86,12 +86,14 @@ impl BusFigures {
 
 /// Starts of frame of all SYNCs.
 pub fn syncs(records: &[WireRecord]) -> Vec<Time> {
-    let is_sync = |frame: &WireFrame| frame.id == WireId::Standard(SYNC) && !frame.rtr;
-    records
-        .iter()
-        .filter(|record| matches!(&record.kind, RecordKind::Frame(frame) if is_sync(frame)))
-        .map(|record| record.sof)
-        .collect()
+    let syncs = records.iter().filter(|record| is_sync(record));
+    syncs.map(|record| record.sof).collect()
+}
+
+/// Whether it is a SYNC that was sent without error.
+pub(super) fn is_sync(record: &WireRecord) -> bool {
+    let sync = |frame: &WireFrame| frame.id == WireId::Standard(SYNC) && !frame.rtr;
+    matches!(&record.kind, RecordKind::Frame(frame) if sync(frame))
 }
 
 /// What was seen of one node between two SYNCs.
@@ -123,6 +125,16 @@ impl Seen {
 /// Judges what was on the wire until `end` against what should have been.
 pub fn judge(records: &[WireRecord], traffic: &Traffic, end: Time) -> BusFigures {
     let mut judge = Judge::new(traffic);
+    for record in records {
+        judge.record(record);
+    }
+    judge.finish(end)
+}
+
+/// The same of records that begin when all nodes were operational already.
+pub fn judge_running(records: &[WireRecord], traffic: &Traffic, end: Time) -> BusFigures {
+    let mut judge = Judge::new(traffic);
+    judge.nodes.iter_mut().for_each(|seen| seen.state(true));
     for record in records {
         judge.record(record);
     }

@@ -136,10 +136,10 @@ impl<'i> World<'i> {
         for (at, stimulus) in &scenario.stimuli {
             agenda.add(*at, stimulus.clone());
         }
-        let operator = if scenario.operated {
-            Operator::new(scenario.seed)
-        } else {
-            Operator::absent()
+        let operator = match (scenario.operated, scenario.restless) {
+            (false, _) => Operator::absent(),
+            (true, false) => Operator::new(scenario.seed),
+            (true, true) => Operator::restless(scenario.seed),
         };
         Ok(World {
             in_motion: scenario.in_motion.clone(),

@@ -43,6 +43,7 @@ enum State {
 #[derive(Clone, Debug)]
 pub(super) struct Operator {
     state: State,
+    patience: Time,
     random: Pcg64Mcg,
 }
 
@@ -50,7 +51,16 @@ impl Operator {
     pub(super) fn new(seed: u64) -> Operator {
         Operator {
             state: State::Waiting { ready_since: None },
+            patience: PATIENCE,
             random: Pcg64Mcg::seed_from_u64(seed),
+        }
+    }
+
+    /// Somebody who presses the button as soon as the machine is at rest.
+    pub(super) fn restless(seed: u64) -> Operator {
+        Operator {
+            patience: Time::ZERO,
+            ..Operator::new(seed)
         }
     }
 
@@ -76,7 +86,7 @@ impl Operator {
         self.state = State::Waiting {
             ready_since: Some(since),
         };
-        if view.now < since + PATIENCE {
+        if view.now < since + self.patience {
             return false;
         }
         let needed = view.round_trip.unwrap_or(Time::ZERO) + MARGIN;

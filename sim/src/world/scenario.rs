@@ -57,6 +57,8 @@ pub struct Scenario {
     pub in_motion: Vec<Stimulus>,
     /// Whether somebody presses the button as soon as the machine is ready.
     pub operated: bool,
+    /// That person never waits: the machine moves all the time.
+    pub restless: bool,
     /// Option bytes of the board's flash, and what its bank 2 holds.
     pub flash: FlashOptions,
 }
@@ -75,6 +77,7 @@ impl Scenario {
             stimuli: Vec::new(),
             in_motion: Vec::new(),
             operated: true,
+            restless: false,
             flash: FlashOptions {
                 seed,
                 ..FlashOptions::default()
@@ -159,6 +162,13 @@ impl Scenario {
     /// The same with what bank 2 of the board's flash holds.
     pub fn stored(mut self, bank2: BankContents) -> Scenario {
         self.flash.bank2 = Some(bank2);
+        self
+    }
+
+    /// The same with somebody who presses the button as soon as the machine is at
+    /// rest.
+    pub fn restless(mut self) -> Scenario {
+        self.restless = true;
         self
     }
 

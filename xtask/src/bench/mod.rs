@@ -2,23 +2,27 @@
 //! emulated board, judged on the bus.
 
 mod motion;
+pub(crate) mod realtime;
 mod sdo;
 mod startup;
 
 use std::process::ExitCode;
 
 use anyhow::Result;
+use canmaster_sim::time::Time;
+use canmaster_sim::world::Image;
 use serde::Serialize;
 
-use crate::cli::{Bench, BenchOptions};
+use crate::cli::{self, Bench, BenchOptions};
 use crate::machine::Checked;
+use realtime::{CASES, Order};
 
 pub(crate) fn command(options: &BenchOptions) -> Result<ExitCode> {
-    let image = Checked::read(None)?.built()?;
     let outcome = match options.bench {
-        Bench::Startup => startup::run(&image, options.seed)?,
-        Bench::Sdo => sdo::run(&image, options.seed)?,
-        Bench::Motion => motion::run(&image, options.seed)?,
+        Bench::Startup => startup::run(&image()?, options.seed)?,
+        Bench::Sdo => sdo::run(&image()?, options.seed)?,
+        Bench::Motion => motion::run(&image()?, options.seed)?,
+        Bench::Realtime => realtime::run(&order(options))?,
     };
     if options.json {
         println!("{}", outcome.json);
@@ -32,6 +36,27 @@ pub(crate) fn command(options: &BenchOptions) -> Result<ExitCode> {
         eprintln!("missed: {words}");
     }
     Ok(ExitCode::FAILURE)
+}
+
+/// The image for the machine of the project.
+fn image() -> Result<Image> {
+    Checked::read(None)?.built()
+}
+
+fn order(options: &BenchOptions) -> Order {
+    let scenario = options.scenario.clone();
+    if let Some(name) = &scenario
+        && CASES.iter().all(|case| case.name != name)
+    {
+        let names = CASES.map(|case| case.name).join(", ");
+        cli::refuse(&format!("--scenario {name}: there are {names}"));
+    }
+    let last = options.seed.saturating_add(options.seeds - 1);
+    Order {
+        scenario,
+        seeds: options.seed..=last,
+        span: Time::from_secs_f64(options.seconds),
+    }
 }
 
 /// What a bench comes to.

@@ -8,6 +8,7 @@ use canmaster_sim::time::Time;
 use canmaster_sim::world::{Image, Record, Scenario, World, trials};
 use serde::Serialize;
 
+use crate::bench::realtime::{self, Case, Order};
 use crate::networks::{self, Variant};
 
 /// The interrupts whose tasks are made to hang, in turn.
@@ -50,6 +51,8 @@ pub(super) struct Row {
     pub(super) wall_s: f64,
     #[serde(flatten)]
     pub(super) figures: Option<Figures>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    real_time: Option<realtime::Figures>,
 }
 
 /// What is measured in a run without disturbance.
@@ -110,6 +113,7 @@ impl Job {
             reason: outcome.err().unwrap_or_default(),
             wall_s: started.elapsed().as_secs_f64(),
             figures,
+            real_time: None,
         }
     }
 
@@ -183,6 +187,25 @@ impl Row {
             reason: outcome.err().map(|e| format!("{e:#}")).unwrap_or_default(),
             wall_s: started.elapsed().as_secs_f64(),
             figures,
+            real_time: None,
+        }
+    }
+
+    /// A scenario of `bench realtime`.
+    pub(super) fn real_time(case: &'static Case, order: &Order) -> Row {
+        let started = Instant::now();
+        let (missed, real_time) = match realtime::measure(case, order) {
+            Ok(figures) => (figures.missed_limits(case), Some(figures)),
+            Err(error) => (vec![format!("{error:#}")], None),
+        };
+        Row {
+            seed: *order.seeds.end(),
+            kind: case.name.to_string(),
+            ok: missed.is_empty(),
+            reason: missed.join("; "),
+            wall_s: started.elapsed().as_secs_f64(),
+            figures: None,
+            real_time,
         }
     }
 

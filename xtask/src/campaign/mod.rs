@@ -12,6 +12,7 @@ use canmaster_sim::time::Time;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
+use crate::bench::realtime::{CASES, Order};
 use crate::cli::CampaignOptions;
 use crate::machine::Checked;
 use crate::networks::{self, Variant};
@@ -22,6 +23,9 @@ use job::{Job, Row};
 const SEEDS: u64 = 20;
 /// The same with a fault each.
 const FAULTS: u64 = 200;
+/// Seeds of each scenario of `bench realtime`, and how much of each is looked at.
+const REALTIME_SEEDS: u64 = 5;
+const REALTIME_SPAN: Time = Time::from_ms(30_000);
 
 /// The JSON object.
 #[derive(Serialize)]
@@ -60,6 +64,7 @@ pub(crate) fn command(options: &CampaignOptions) -> Result<ExitCode> {
     let runs: Vec<Row> = runs
         .into_iter()
         .chain(networks::all().map(network))
+        .chain(real_time())
         .collect();
     let wall_s = started.elapsed().as_secs_f64();
     let ok = runs.iter().filter(|row| row.ok).count();
@@ -96,6 +101,19 @@ fn network(variant: Variant) -> Row {
         eprintln!("{}: {}", row.kind, row.reason);
     }
     row
+}
+
+/// The scenarios of `bench realtime`, long and with several seeds.
+fn real_time() -> Vec<Row> {
+    let order = Order {
+        scenario: None,
+        seeds: 1..=REALTIME_SEEDS,
+        span: REALTIME_SPAN,
+    };
+    CASES
+        .iter()
+        .map(|case| Row::real_time(case, &order))
+        .collect()
 }
 
 fn progress(jobs: usize) -> ProgressBar {

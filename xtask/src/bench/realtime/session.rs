@@ -1,0 +1,123 @@
+//! One run of a scenario.
+
+use std::time::Instant;
+
+use anyhow::{Context, Result, bail};
+use canmaster::NodeId;
+use canmaster::id::Address;
+use canmaster::sdo::Protocol;
+use canmaster_sim::time::Time;
+use canmaster_sim::world::{Client, Image, World};
+use indicatif::ProgressBar;
+
+use super::case::Case;
+use super::figures::{Figures, Measured};
+
+/// All drives are enabled by then.
+const READY_BY: Time = Time::from_ms(8000);
+/// All axes turn so soon after that.
+const MOVING_BY: Time = Time::from_ms(2000);
+/// How often the bar is moved.
+const LOOK: Time = Time::from_ms(20);
+/// 1F22h, concise DCF: the largest objects of the board, one of each node.
+const CONCISE_DCF: u16 = 0x1F22;
+
+/// Boots the machine, lets it move, and looks at `span` of it.
+pub(super) fn run(
+    case: &Case,
+    image: &Image,
+    seed: u64,
+    span: Time,
+    bar: &ProgressBar,
+) -> Result<Figures> {
+    let started = Instant::now();
+    let scenario = case.scenario(image.machine(), seed);
+    let mut world =
+        World::new(image, scenario).context("the emulated board cannot boot this image")?;
+    bar.set_length(span.as_ms());
+    bar.set_position(0);
+    bar.set_message(format!("{}, seed {seed}: booting", case.name));
+    let ready = world.run_to(READY_BY, World::ready);
+    must(&world, ready, "the drives are not all enabled")?;
+    let limit = world.now() + MOVING_BY;
+    let moving = world.run_to(limit, World::in_full_motion);
+    must(&world, moving, "the axes do not turn")?;
+    world.clear_stats();
+    let from = world.now();
+    let to = from + span;
+    bar.set_message(format!("{}, seed {seed}", case.name));
+    let measured = if case.disturbed {
+        let mut outsider = Outsider::new(world);
+        while outsider.client.world.now() < to {
+            outsider.read();
+            bar.set_position((outsider.client.world.now() - from).as_ms());
+        }
+        Measured {
+            record: outsider.client.world.finish(),
+            from,
+            to,
+            wall_s: 0.0,
+            outside_transfers: outsider.transfers,
+            refused: outsider.refused,
+        }
+    } else {
+        while world.now() < to {
+            let next = (world.now() + LOOK).min(to);
+            world.run_until(next);
+            bar.set_position((world.now() - from).as_ms());
+        }
+        Measured {
+            record: world.finish(),
+            from,
+            to,
+            wall_s: 0.0,
+            outside_transfers: 0,
+            refused: Vec::new(),
+        }
+    };
+    let wall_s = started.elapsed().as_secs_f64();
+    Ok(Figures::new(case, &Measured { wall_s, ..measured }))
+}
+
+/// Somebody who reads the board's dictionary by block transfer, over and over.
+struct Outsider<'i> {
+    client: Client<'i>,
+    nodes: Vec<NodeId>,
+    transfers: usize,
+    refused: Vec<String>,
+}
+
+impl<'i> Outsider<'i> {
+    fn new(world: World<'i>) -> Outsider<'i> {
+        let network = world.machine().network();
+        Outsider {
+            nodes: network.nodes.iter().map(|node| node.id).collect(),
+            client: Client::new(world, network.master.node),
+            transfers: 0,
+            refused: Vec::new(),
+        }
+    }
+
+    /// The next object.
+    fn read(&mut self) {
+        let turn = self.transfers % self.nodes.len();
+        let at = Address::new(CONCISE_DCF, self.nodes[turn].get());
+        if let Err(error) = self.client.read(at, Protocol::Block) {
+            self.refused
+                .push(format!("reading {at} of the board: {error}"));
+        }
+        self.transfers += 1;
+    }
+}
+
+fn must(world: &World<'_>, holds: bool, otherwise: &str) -> Result<()> {
+    if holds {
+        return Ok(());
+    }
+    let last = world.log().last();
+    let words = last.map(|(_, line)| line.to_string()).unwrap_or_default();
+    bail!(
+        "at {} s {otherwise}; the firmware's last words: {words}",
+        world.now()
+    )
+}
