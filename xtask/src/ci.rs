@@ -28,7 +28,6 @@ pub(crate) fn test(options: &TestOptions) -> Result<ExitCode> {
     tests(&options.args)?;
     if options.args.is_empty() {
         networks::four()?;
-        benched(Bench::Realtime)?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -48,7 +47,7 @@ fn tests(args: &[String]) -> Result<()> {
 /// `cargo xtask ci`: everything that has to pass, in the order of how soon it
 /// fails.
 pub(crate) fn command(options: &CiOptions) -> Result<ExitCode> {
-    let steps: [Step; 13] = [
+    let steps: [Step; 12] = [
         ("format", format),
         ("lints, host", lints_host),
         ("lints, board", lints_target),
@@ -58,7 +57,6 @@ pub(crate) fn command(options: &CiOptions) -> Result<ExitCode> {
         ("one run", one_run),
         ("bench startup", || benched(Bench::Startup)),
         ("bench sdo", || benched(Bench::Sdo)),
-        ("bench realtime", || benched(Bench::Realtime)),
         ("other tools", interop::tests),
         ("documentation", documentation),
         ("conformance table", conformance::check),

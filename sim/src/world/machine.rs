@@ -11,7 +11,6 @@ use canmaster::network::{ConfigWrite, Identity, Master, Network, Node, Pdo};
 use canmaster::pdo::{MappingEntry, Transmission};
 use canmaster::time::Duration;
 use canmaster::{NodeId, id::Address};
-use canmaster_network::frame::{SYNC_BYTES, longest_bits};
 use canmaster_network::model;
 
 use crate::judge::{Assignment, Part, Traffic};
@@ -154,18 +153,6 @@ impl Machine {
             nodes: segment.axes.iter().filter_map(node).collect(),
         }
     }
-
-    /// No master can have a shorter cycle: SYNC and the PDOs of every cycle, with
-    /// all the stuff bits that there may be, on the bus that has the most of them.
-    pub fn wire_bound_us(&self) -> u32 {
-        let of = |segment: &Segment| {
-            let node = |axis: &usize| self.network.nodes.get(*axis);
-            let pdos = segment.axes.iter().filter_map(node).flat_map(pdo_bits);
-            let bits = pdos.sum::<u32>() + longest_bits(SYNC_BYTES);
-            (u64::from(bits) * US_PER_S).div_ceil(u64::from(segment.bit_rate)) as u32
-        };
-        self.segments.iter().map(of).max().unwrap_or(0)
-    }
 }
 
 /// Where each axis has to go, step by step.
@@ -232,10 +219,6 @@ fn segments(described: &model::Machine) -> Vec<Segment> {
         .collect()
 }
 
-/// Transmission type: with every SYNC.
-const EVERY_SYNC: u8 = 1;
-const US_PER_S: u64 = 1_000_000;
-
 /// The sample's only bus.
 fn sample_segment() -> Segment {
     Segment {
@@ -244,20 +227,6 @@ fn sample_segment() -> Segment {
         bit_rate: SIX_EPOS4.bit_rate,
         axes: (0..SIX_EPOS4.nodes.len()).collect(),
     }
-}
-
-/// Bits of the PDOs of a node that are on the bus in every cycle, at worst.
-fn pdo_bits(node: &Node) -> impl Iterator<Item = u32> {
-    let pdos = node.rpdos.iter().chain(node.tpdos);
-    let every_cycle = pdos.filter(|pdo| pdo.transmission == Transmission::from_code(EVERY_SYNC));
-    every_cycle.map(|pdo| {
-        let bits: u32 = pdo
-            .mapping
-            .iter()
-            .map(|entry| u32::from(entry.bits()))
-            .sum();
-        longest_bits(bits.div_ceil(u8::BITS) as u8)
-    })
 }
 
 /// The description as the library has it.

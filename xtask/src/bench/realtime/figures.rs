@@ -30,6 +30,7 @@ pub(crate) struct Figures {
     burst_gap_max_bits: f64,
     /// On the bus that had the fewest.
     sdo_exchanges_per_s: f64,
+    /// SYNC and the PDOs of every cycle at worst, on the fullest bus.
     wire_bound_us: u32,
     stack_high_water_bytes: u32,
     seeds: u64,
@@ -46,6 +47,8 @@ pub(super) struct Measured {
     pub(super) record: Record,
     pub(super) from: Time,
     pub(super) to: Time,
+    /// See [`Figures`].
+    pub(super) wire_bound_us: u32,
     pub(super) wall_s: f64,
     pub(super) outside_transfers: usize,
     /// Refused transfers of the outside client.
@@ -102,7 +105,7 @@ impl Figures {
             irq_off_max_cycles: record.board.irq_off_max_cycles,
             burst_gap_max_bits: worst(|bus| bus.burst_gap_bits),
             sdo_exchanges_per_s: answers.unwrap_or(0) as f64 / span,
-            wire_bound_us: record.machine.wire_bound_us(),
+            wire_bound_us: measured.wire_bound_us,
             stack_high_water_bytes: record.board.stack_high_water_bytes,
             seeds: 1,
             simulated_s: span,

@@ -14,10 +14,10 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
 use super::{Outcome, Report};
-use crate::machine::Checked;
 use crate::table;
 pub(crate) use case::{CASES, Case};
 pub(crate) use figures::Figures;
+use session::Built;
 
 /// What is asked for.
 #[derive(Clone, Debug)]
@@ -75,11 +75,11 @@ pub(super) fn run(order: &Order) -> Result<Outcome> {
 /// Builds the image of a scenario and runs it with every seed.
 pub(crate) fn measure(case: &Case, order: &Order) -> Result<Figures> {
     eprintln!("{}", case.name);
-    let image = Checked::read(Some(&case.path()))?.built()?;
+    let built = Built::new(&case.path())?;
     let bar = bar();
     let mut all: Option<Figures> = None;
     for seed in order.seeds.clone() {
-        let figures = session::run(case, &image, seed, order.span, &bar)?;
+        let figures = session::run(case, &built, seed, order.span, &bar)?;
         all = Some(match all {
             Some(all) => all.and(figures),
             None => figures,

@@ -1,5 +1,6 @@
 //! One run of a scenario.
 
+use std::path::Path;
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
@@ -12,6 +13,7 @@ use indicatif::ProgressBar;
 
 use super::case::Case;
 use super::figures::{Figures, Measured};
+use crate::machine::{Checked, Description};
 
 /// All axes turn by then.
 const MOVING_BY: Time = Time::from_ms(10_000);
@@ -20,17 +22,39 @@ const LOOK: Time = Time::from_ms(20);
 /// 1F22h, concise DCF: the largest objects of the board, one of each node.
 const CONCISE_DCF: u16 = 0x1F22;
 
+/// What is run.
+pub(super) struct Built {
+    pub(super) image: Image,
+    /// SYNC and the PDOs of every cycle at worst, on the fullest bus.
+    pub(super) wire_bound_us: u32,
+}
+
+impl Built {
+    /// Builds the image of a description.
+    pub(super) fn new(description: &Path) -> Result<Built> {
+        let machine = Description::check(Some(description))?.machine;
+        let bounds = machine
+            .buses
+            .iter()
+            .map(|bus| bus.layout.demand.wire_bound_us());
+        Ok(Built {
+            image: Checked::read(Some(description))?.built()?,
+            wire_bound_us: bounds.max().unwrap_or(0),
+        })
+    }
+}
+
 /// Boots the machine, lets it move, and looks at `span` of it.
 pub(super) fn run(
     case: &Case,
-    image: &Image,
+    built: &Built,
     seed: u64,
     span: Time,
     bar: &ProgressBar,
 ) -> Result<Figures> {
-    let scenario = case.scenario(image.machine(), seed);
+    let scenario = case.scenario(built.image.machine(), seed);
     let mut world =
-        World::new(image, scenario).context("the emulated board cannot boot this image")?;
+        World::new(&built.image, scenario).context("the emulated board cannot boot this image")?;
     bar.set_length(span.as_ms());
     bar.set_position(0);
     bar.set_message(format!("{}, seed {seed}: booting", case.name));
@@ -45,37 +69,34 @@ pub(super) fn run(
     let from = world.now();
     let to = from + span;
     bar.set_message(format!("{}, seed {seed}", case.name));
-    let measured = if case.disturbed {
+    let mut transfers = 0;
+    let mut refused = Vec::new();
+    if case.disturbed {
         let mut outsider = Outsider::new(world);
         while outsider.client.world.now() < to {
             outsider.read();
             bar.set_position((outsider.client.world.now() - from).as_ms());
         }
-        Measured {
-            record: outsider.client.world.finish(),
-            from,
-            to,
-            wall_s: 0.0,
-            outside_transfers: outsider.transfers,
-            refused: outsider.refused,
-        }
+        transfers = outsider.transfers;
+        refused = outsider.refused;
+        world = outsider.client.world;
     } else {
         while world.now() < to {
             let next = (world.now() + LOOK).min(to);
             world.run_until(next);
             bar.set_position((world.now() - from).as_ms());
         }
-        Measured {
-            record: world.finish(),
-            from,
-            to,
-            wall_s: 0.0,
-            outside_transfers: 0,
-            refused: Vec::new(),
-        }
+    }
+    let measured = Measured {
+        record: world.finish(),
+        from,
+        to,
+        wire_bound_us: built.wire_bound_us,
+        wall_s: started.elapsed().as_secs_f64(),
+        outside_transfers: transfers,
+        refused,
     };
-    let wall_s = started.elapsed().as_secs_f64();
-    Ok(Figures::new(case, &Measured { wall_s, ..measured }))
+    Ok(Figures::new(case, &measured))
 }
 
 /// Somebody who reads the board's dictionary by block transfer, over and over.
