@@ -154,3 +154,12 @@ fn more_axes_than_it_leads() {
         "{words}"
     );
 }
+
+#[test]
+fn controlword_and_target_go_in_every_cycle() {
+    says(
+        "map = [\"Controlword\", \"Target velocity\"]",
+        "send = \"on change\"\nmap = [\"Controlword\", \"Target velocity\"]",
+        &["`RPDO1`", "controlword and target velocity in every cycle"],
+    );
+}

@@ -37,13 +37,12 @@ pub(crate) fn capacity(
             }
         })
         .collect();
-    for (described, demand) in described.iter().zip(&demands) {
-        sdo(described, demand, context);
-    }
     let layouts = in_order(&described, &buses, &demands);
     let tries = layouts.iter().zip(&buses).zip(&described);
     for ((layout, bus), described) in tries {
-        if !layout.fits() {
+        if layout.lacks_only_sdo() {
+            sdo(described, layout, context);
+        } else if !layout.fits() {
             let cycle = &described.cycle_us;
             let at = context.at(cycle);
             context.problems.error(
@@ -92,22 +91,38 @@ fn same_cycle(described: &[&description::Bus], buses: &[Bus], context: &mut Cont
     }
 }
 
-/// Whether planned SDO frames can be kept out of the guard at all.
-fn sdo(described: &description::Bus, demand: &Demand, context: &mut Context<'_>) {
-    let Some(frames) = &described.sdo_frames else {
-        return;
-    };
-    if demand.is_planned() && !demand.sdo_can_be_planned() {
-        let at = context.at(frames);
+/// SDO frames cannot be kept out of the guard.
+fn sdo(described: &description::Bus, layout: &Layout, context: &mut Context<'_>) {
+    let demand = &layout.demand;
+    let (soonest, slowest) = demand.sdo_latency_us.unwrap_or_default();
+    if !demand.sdo_can_be_planned() {
+        // It is not the default.
+        let at = described.sdo_frames.as_ref().unwrap_or(&described.cycle_us);
+        let place = context.at(at);
         context.problems.error(
-            &at,
-            frames.get_ref(),
-            "with one SDO frame in a cycle, a request at its end must not be answered before the \
-             next SYNC, and the soonest answer of sdo_latency_us is sooner than a frame and \
-             guard_us",
+            &place,
+            at.get_ref(),
+            format!(
+                "with one SDO frame in a cycle, a request at its end must not be answered before \
+                 the next SYNC, and the soonest answer, {soonest} us, is sooner than a frame and \
+                 guard_us"
+            ),
             "write sdo_frames = 2, for the answer in the same cycle, or lower guard_us",
         );
+        return;
     }
+    let at = &described.cycle_us;
+    let place = context.at(at);
+    context.problems.error(
+        &place,
+        at.get_ref(),
+        format!(
+            "an SDO exchange takes up to {} us of a cycle with the slowest answer, {slowest} us",
+            demand.least_for_sdo_us()
+        ),
+        "take a longer cycle; or write sdo_frames = 0, for no SDO in operational; or leave \
+         sdo_latency_us out, so that answers may be in the way of a SYNC",
+    );
 }
 
 /// The layouts of all buses with RPDOs after the TPDOs; if they do not fit, and

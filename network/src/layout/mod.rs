@@ -182,6 +182,15 @@ impl Layout {
             .max(self.demand.least_for_sdo_us())
     }
 
+    /// Whether only the place for SDO requests is missing.
+    pub(crate) fn lacks_only_sdo(&self) -> bool {
+        let without = Demand {
+            sdo_latency_us: None,
+            ..self.demand.clone()
+        };
+        !self.fits() && without.layout(self.cycle_us).fits()
+    }
+
     /// The kind of slot that takes the most time, to say what to change.
     pub fn largest(&self) -> SlotKind {
         use SlotKind::{Compute, Guard, Latency, Other, Planned, Rpdo, Tpdo};

@@ -31,10 +31,12 @@ impl Demand {
     }
 
     /// Until when a frame that is handed over goes directly after SYNC, ahead of all
-    /// TPDOs, in microseconds.
+    /// TPDOs, and has ended when the slowest is ready, in microseconds.
     pub fn after_sync_us(&self) -> u32 {
-        let shortest = self.bits_ns(shortest_bits(SYNC_BYTES)) / NS_PER_US;
-        shortest as u32 + self.earliest_us
+        let shortest = (self.bits_ns(shortest_bits(SYNC_BYTES)) / NS_PER_US) as u32;
+        let ready = self.us(longest_bits(SYNC_BYTES)) + self.latency_us;
+        let latest = ready.saturating_sub(self.us(longest_bits(SDO_BYTES)));
+        (shortest + self.earliest_us).min(latest.max(shortest))
     }
 
     /// Whether there is any cycle that a planned exchange fits into.
@@ -43,7 +45,7 @@ impl Demand {
     }
 
     /// The shortest cycle that a planned exchange fits into, in microseconds.
-    pub(super) fn least_for_sdo_us(&self) -> u32 {
+    pub(crate) fn least_for_sdo_us(&self) -> u32 {
         let (Some((least, most)), true) = (self.sdo_latency_us, self.sdo_frames > 0) else {
             return 0;
         };
@@ -64,17 +66,19 @@ impl Demand {
         let sum = |frames: &[super::demand::Cyclic]| -> u32 {
             frames.iter().map(|(_, _, n)| longest_bits(*n)).sum()
         };
+        let (rpdos, ramps) = (sum(&self.rpdos), sum(&self.ramps));
         let ahead = match self.order {
-            RpdoOrder::AfterTpdos => sum(&self.ramps),
-            RpdoOrder::AfterSync => sum(&self.ramps) + sum(&self.rpdos),
+            RpdoOrder::AfterTpdos => ramps,
+            RpdoOrder::AfterSync => ramps + rpdos,
         };
         let request = longest_bits(SDO_BYTES);
         let sync = longest_bits(SYNC_BYTES);
-        match ahead {
-            0 => self.after_sync_us().max(self.us(sync)) + self.us(request),
-            // The TPDOs are ready before its turn comes.
-            _ => self.latency_us + self.us(sync + ahead + sum(&self.tpdos) + request),
+        if ahead == 0 {
+            return self.after_sync_us().max(self.us(sync)) + self.us(request);
         }
+        // Everything else may be ready before its turn comes.
+        let cyclic = sync + ramps + sum(&self.tpdos) + rpdos;
+        self.latency_us + self.compute_us + self.us(cyclic + request)
     }
 
     /// How long before the end of a cycle a request may begin whose answer comes
