@@ -13,7 +13,7 @@ use crate::emcy::EmcyCobId;
 use crate::id::{Address, CobId, FunctionCode, NodeId};
 use crate::network;
 use crate::nmt::{Command, NodeControl, Target};
-use crate::od::{Chunk, Entry, ObjectDictionary, Value, read_bytes};
+use crate::od::{Access, Chunk, DataType, Entry, ObjectDictionary, Value, read_bytes};
 use crate::pdo::Direction;
 use crate::sdo::AbortCode;
 use crate::time::Instant;
@@ -154,6 +154,11 @@ fn sdo_channel(sub: u8, server: NodeId) -> u32 {
 impl<B: Board, const N: usize> ObjectDictionary for View<'_, B, N> {
     fn entry(&self, at: Address) -> Result<Entry, AbortCode> {
         self.dictionary.entry(at)
+    }
+
+    fn kind(&self, at: Address) -> Result<(DataType, Access), AbortCode> {
+        let found = self.dictionary.find(at)?;
+        Ok((found.data_type, found.access))
     }
 
     /// The ranges of the settings are theirs to check.

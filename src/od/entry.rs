@@ -17,6 +17,26 @@ pub enum Access {
     Constant,
 }
 
+impl Access {
+    /// # Errors
+    /// 06010001h if the entry cannot be read.
+    pub const fn readable(self) -> Result<(), AbortCode> {
+        match self {
+            Access::WriteOnly => Err(AbortCode::WRITE_ONLY),
+            _ => Ok(()),
+        }
+    }
+
+    /// # Errors
+    /// 06010002h if the entry cannot be written.
+    pub const fn writable(self) -> Result<(), AbortCode> {
+        match self {
+            Access::ReadOnly | Access::Constant => Err(AbortCode::READ_ONLY),
+            Access::WriteOnly | Access::ReadWrite => Ok(()),
+        }
+    }
+}
+
 /// Into which PDOs an entry can be mapped (CiA 301, 7.4.5).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -72,19 +92,13 @@ impl Entry {
     /// # Errors
     /// 06010001h if the entry cannot be read.
     pub const fn readable(&self) -> Result<(), AbortCode> {
-        match self.access {
-            Access::WriteOnly => Err(AbortCode::WRITE_ONLY),
-            _ => Ok(()),
-        }
+        self.access.readable()
     }
 
     /// # Errors
     /// 06010002h if the entry cannot be written.
     pub const fn writable(&self) -> Result<(), AbortCode> {
-        match self.access {
-            Access::ReadOnly | Access::Constant => Err(AbortCode::READ_ONLY),
-            Access::WriteOnly | Access::ReadWrite => Ok(()),
-        }
+        self.access.writable()
     }
 
     /// # Errors

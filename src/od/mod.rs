@@ -53,6 +53,15 @@ pub trait ObjectDictionary {
     /// 06020000h if the object, 06090011h if the sub-index does not exist.
     fn entry(&self, at: Address) -> Result<Entry, AbortCode>;
 
+    /// Type and access of an entry alone.
+    ///
+    /// # Errors
+    /// As [`entry`](Self::entry).
+    fn kind(&self, at: Address) -> Result<(DataType, Access), AbortCode> {
+        let entry = self.entry(at)?;
+        Ok((entry.data_type, entry.access))
+    }
+
     /// Whether an entry takes a value, of the type that it has.
     ///
     /// # Errors

@@ -3,8 +3,16 @@
 //! (CiA 301, 7.2.4.3.8 .. 7.2.4.3.16).
 
 use super::abort::AbortCode;
-use super::command::{BLOCK_MAX, BlockSegment, Command, End, SEGMENT_MAX};
+use super::command::{Answer, BLOCK_MAX, BlockSegment, Command, End, Request, SEGMENT_MAX};
 use super::crc::Crc16;
+
+/// The codes of the commands that either side sends in the course of a block
+/// transfer: they go by who sends the data, not by who is the client.
+const ACKNOWLEDGE: u8 = Request::BlockUploadAcknowledge.code();
+const END: u8 = Request::BlockDownloadEnd.code();
+const _: () = assert!(
+    ACKNOWLEDGE == Answer::BlockDownloadAcknowledge.code() && END == Answer::BlockUploadEnd.code()
+);
 
 /// After so many acknowledgements in a row of nothing at all the sender gives
 /// up: a transfer that makes no progress must end.
@@ -78,12 +86,9 @@ impl Sender {
         data: [u8; SEGMENT_MAX],
         len: usize,
         last: bool,
-    ) -> Result<BlockSegment, AbortCode> {
+    ) -> Result<Command, AbortCode> {
         let offset = self.offset(self.sequence)?;
-        let bytes = data.get(..len).ok_or(AbortCode::GENERAL)?;
-        if len < SEGMENT_MAX && !last {
-            return Err(AbortCode::GENERAL);
-        }
+        let bytes = data.get(..len).unwrap_or(&data);
         // What is sent again has been summed before.
         if self.use_crc && offset == self.summed {
             self.crc = self.crc.update(bytes);
@@ -92,26 +97,28 @@ impl Sender {
         self.sequence += 1;
         self.tail = last.then_some(len as u8);
         self.sending = !last && self.sequence < self.block_size;
-        Ok(BlockSegment {
+        let segment = BlockSegment {
             last,
             sequence: self.sequence,
             data,
-        })
+        };
+        Ok(Command(segment.encode()))
     }
 
     /// The receiver tells how many segments of the block it has and how many it
-    /// wants in the next. Yields the end once it has everything.
-    pub(super) fn acknowledged(&mut self, command: Command) -> Result<Option<End>, AbortCode> {
+    /// wants in the next. Yields the end command once it has everything.
+    pub(super) fn acknowledged(&mut self, command: Command) -> Result<Option<Command>, AbortCode> {
         let (sequence, block_size) = command.acknowledged();
         if sequence > self.sequence {
             return Err(AbortCode::SEQUENCE_NUMBER);
         }
         if let Some(tail) = self.tail.filter(|_| sequence == self.sequence) {
             self.sending = false;
-            return Ok(Some(End {
+            let end = End {
                 unused: (SEGMENT_MAX as u8).saturating_sub(tail),
                 crc: self.crc.get(),
-            }));
+            };
+            return Ok(Some(Command::block_end(END, end)));
         }
         self.fruitless = if sequence == 0 { self.fruitless + 1 } else { 0 };
         if self.fruitless > FRUITLESS_MAX {
@@ -173,11 +180,6 @@ impl Receiver {
         self.complete
     }
 
-    /// How many segments a block has.
-    pub(super) const fn block_size(&self) -> u8 {
-        self.block_size
-    }
-
     /// Takes in a segment and gives out the one before it, which is not the last.
     /// A segment out of sequence is discarded with all that follow it in the
     /// block.
@@ -207,15 +209,15 @@ impl Receiver {
         Ok(before)
     }
 
-    /// The sequence number to acknowledge, if the block is over.
-    pub(super) fn over(&mut self) -> Option<u8> {
+    /// The acknowledgement, if the block is over.
+    pub(super) fn over(&mut self) -> Option<Command> {
         core::mem::take(&mut self.over).then(|| self.acknowledge())
     }
 
-    /// Nothing has come for a while: what to acknowledge so that the sender
-    /// repeats the rest. `None` the second time in a row, or if there is
-    /// nothing to repeat.
-    pub(super) fn stall(&mut self) -> Option<u8> {
+    /// Nothing has come for a while: the acknowledgement that lets the sender
+    /// repeat the rest. `None` the second time in a row, or if there is nothing
+    /// to repeat.
+    pub(super) fn stall(&mut self) -> Option<Command> {
         if self.stalled || self.complete {
             return None;
         }
@@ -223,8 +225,9 @@ impl Receiver {
         Some(self.acknowledge())
     }
 
-    fn acknowledge(&mut self) -> u8 {
-        core::mem::take(&mut self.sequence)
+    fn acknowledge(&mut self) -> Command {
+        let sequence = core::mem::take(&mut self.sequence);
+        Command::acknowledge(ACKNOWLEDGE, sequence, self.block_size)
     }
 
     /// The end command has come: the bytes of the last segment, if the

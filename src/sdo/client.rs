@@ -81,16 +81,10 @@ impl Client {
         data: &[u8],
         now: Instant,
     ) -> Result<Frame, StartError> {
-        let mut buffer = Response::empty(at);
-        if data.is_empty() || !buffer.append(data) {
-            return Err(StartError::Length(data.len()));
+        if data.is_empty() {
+            return Err(StartError::Length(0));
         }
-        let size = data.len() as u32;
-        let frame = self
-            .channel
-            .download(at, size, Protocol::Normal, &mut buffer, now)?;
-        self.buffer = buffer;
-        Ok(frame)
+        self.start(at, Some(data), now)
     }
 
     /// Reads an entry. Returns the frame to send.
@@ -98,8 +92,25 @@ impl Client {
     /// # Errors
     /// If the channel is not free.
     pub fn upload(&mut self, at: Address, now: Instant) -> Result<Frame, StartError> {
-        let frame = self.channel.upload(at, Protocol::Normal, now)?;
-        self.buffer = Response::empty(at);
+        self.start(at, None, now)
+    }
+
+    fn start(
+        &mut self,
+        at: Address,
+        data: Option<&[u8]>,
+        now: Instant,
+    ) -> Result<Frame, StartError> {
+        let mut buffer = Response::empty(at);
+        if let Some(data) = data
+            && !buffer.append(data)
+        {
+            return Err(StartError::Length(data.len()));
+        }
+        let size = data.map(|data| data.len() as u32);
+        let (protocol, payload) = (Protocol::Normal, &mut buffer);
+        let frame = self.channel.start(at, size, protocol, payload, now)?;
+        self.buffer = buffer;
         Ok(frame)
     }
 

@@ -91,11 +91,7 @@ impl Session {
             } else if let Some(over) = self.over.take() {
                 return Course::Over(over);
             } else {
-                let (at, protocol) = (self.at, self.protocol);
-                let begun = match self.size {
-                    Some(size) => channel.download(at, size, protocol, payload, now),
-                    None => channel.upload(at, protocol, now),
-                };
+                let begun = channel.start(self.at, self.size, self.protocol, payload, now);
                 begun.map_or(Progress::Nothing, Progress::Send)
             };
             match progress {

@@ -29,7 +29,7 @@ mod segmented;
 
 use super::abort::AbortCode;
 use super::block::{Receiver, Sender};
-use super::command::{Answer, BLOCK_MAX, Bytes, Command};
+use super::command::{Answer, BLOCK_MAX, Bytes, Command, Request};
 use super::error::SdoError;
 use super::progress::{Progress, StartError};
 use crate::frame::Frame;
@@ -55,6 +55,24 @@ pub trait Payload {
     /// The code to end the transfer with.
     fn write(&mut self, offset: u32, data: &[u8]) -> Result<(), AbortCode>;
 }
+
+/// What an upload has to send.
+struct Nothing;
+
+impl Payload for Nothing {
+    fn read(&mut self, _: u32, _: &mut [u8]) {}
+
+    fn begin(&mut self, _: Option<u32>) -> Result<(), AbortCode> {
+        Ok(())
+    }
+
+    fn write(&mut self, _: u32, _: &[u8]) -> Result<(), AbortCode> {
+        Ok(())
+    }
+}
+
+/// Segments per block that a client takes.
+const BLOCK_SIZE: u8 = BLOCK_MAX;
 
 /// How data is to be transferred.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -94,58 +112,77 @@ pub struct Channel {
     /// Bytes of the transfer under way: to be sent, or announced by the
     /// server.
     size: Option<u32>,
-    /// Bytes received.
-    received: u32,
+    /// How many of them have been sent or received in order.
+    done: u32,
     state: State,
+    /// The toggle bit of the segment, or of the request for one, that is to be
+    /// confirmed.
+    toggle: bool,
+    /// This end of a block download.
+    sender: Sender,
+    /// This end of a block upload.
+    receiver: Receiver,
 }
 
-#[derive(Clone, Copy, Debug)]
+/// What is awaited.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
     Idle,
     Quarantine,
     /// Everything is done; it only has to be told.
-    Finished(u32),
-    /// The initiate of a download was sent.
-    Download {
-        expedited: bool,
-    },
-    /// A segment was sent; with it the first `sent` bytes are.
-    DownloadSegment {
-        sent: u32,
-        toggle: bool,
-    },
-    /// The initiate of an upload was sent.
+    Finished,
+    /// The answer to a download with all its data.
+    ExpeditedDownload,
+    /// The answer to the initiate of a download.
+    Download,
+    /// The confirmation of a segment.
+    DownloadSegment,
+    /// The answer to the initiate of an upload.
     Upload,
-    /// A segment was requested.
-    UploadSegment {
-        toggle: bool,
-    },
-    /// The initiate of a block download was sent.
+    /// A segment.
+    UploadSegment,
+    /// The answer to the initiate of a block download.
     BlockDownload,
-    /// Segments are being sent, or await their acknowledgement.
-    BlockDownloadSegments(Sender),
-    /// The end of a block download was sent.
+    /// Segments to be sent, or their acknowledgement.
+    BlockDownloadSegments,
+    /// The confirmation of the end of a block download.
     BlockDownloadEnd,
-    /// The initiate of a block upload was sent.
+    /// The answer to the initiate of a block upload.
     BlockUpload,
-    /// Segments, or the end, are awaited.
-    BlockUploadSegments(Receiver),
+    /// Segments, or the end.
+    BlockUploadSegments,
 }
 
-/// What a step of a transfer comes to.
+/// What an answer comes to.
 enum Step {
     /// Wait on.
     Wait,
     /// Not an answer to what was asked: wait on, the timeout keeps running.
     Ignore,
     Send(Command),
-    Done(u32),
+    Done,
+}
+
+/// Why the transfer fails.
+struct Failure(Fault, AbortCode);
+
+/// Whose fault it is.
+enum Fault {
     /// The server refused.
-    Refused(AbortCode),
+    Refusal,
     /// The server broke the protocol.
-    Violation(AbortCode),
-    /// The caller's payload refused, or the sizes do not match.
-    Failed(SdoError),
+    Violation,
+    /// The server has sent more or fewer bytes than it announced.
+    Size,
+    /// The caller's payload refused what came.
+    Payload,
+}
+
+impl From<AbortCode> for Failure {
+    /// A violation of the protocol, unless told otherwise.
+    fn from(code: AbortCode) -> Failure {
+        Failure(Fault::Violation, code)
+    }
 }
 
 impl Channel {
@@ -160,8 +197,11 @@ impl Channel {
             deadline: Instant::ZERO,
             at: Address::new(0, 0),
             size: None,
-            received: 0,
+            done: 0,
             state: State::Idle,
+            toggle: false,
+            sender: Sender::new(BLOCK_MAX, false),
+            receiver: Receiver::new(BLOCK_MAX, false),
         }
     }
 
@@ -201,13 +241,7 @@ impl Channel {
         payload: &mut dyn Payload,
         now: Instant,
     ) -> Result<Frame, StartError> {
-        self.start(at, Some(size), now)?;
-        let request = if protocol == Protocol::Block && self.block {
-            self.begin_block_download(size)
-        } else {
-            self.begin_download(size, payload)
-        };
-        Ok(self.send(request, now))
+        self.start(at, Some(size), protocol, payload, now)
     }
 
     /// Reads an entry. Returns the frame to send.
@@ -220,13 +254,60 @@ impl Channel {
         protocol: Protocol,
         now: Instant,
     ) -> Result<Frame, StartError> {
-        self.start(at, None, now)?;
-        let request = if protocol == Protocol::Block && self.block {
-            self.begin_block_upload()
-        } else {
-            self.begin_upload()
-        };
+        self.start(at, None, protocol, &mut Nothing, now)
+    }
+
+    /// Writes `size` bytes, or reads what there is if there is no size. Returns
+    /// the frame to send.
+    ///
+    /// # Errors
+    /// If the channel is not free.
+    pub(super) fn start(
+        &mut self,
+        at: Address,
+        size: Option<u32>,
+        protocol: Protocol,
+        payload: &mut dyn Payload,
+        now: Instant,
+    ) -> Result<Frame, StartError> {
+        match self.state {
+            _ if self.is_ready(now) => {}
+            State::Quarantine => {
+                return Err(StartError::Quarantine {
+                    until: self.deadline,
+                });
+            }
+            _ => return Err(StartError::Busy),
+        }
+        self.at = at;
+        self.size = size;
+        self.done = 0;
+        let block = protocol == Protocol::Block && self.block;
+        let request = self.begin(block, payload);
         Ok(self.send(request, now))
+    }
+
+    /// The initiate of a transfer (CiA 301, 7.2.4.3.3, 7.2.4.3.6, 7.2.4.3.9,
+    /// 7.2.4.3.13).
+    fn begin(&mut self, block: bool, payload: &mut dyn Payload) -> Command {
+        let (at, size) = (self.at, self.size);
+        let (state, command) = match (size, block) {
+            (Some(_), true) => (
+                State::BlockDownload,
+                Command::block_of(Request::BlockDownload.code(), at, size),
+            ),
+            (Some(size), false) => return self.begin_download(size, payload),
+            (None, true) => (
+                State::BlockUpload,
+                Command::block_for(Request::BlockUpload.code(), at, BLOCK_SIZE),
+            ),
+            (None, false) => (
+                State::Upload,
+                Command::addressed(Request::Upload.code(), at, [0; 4]),
+            ),
+        };
+        self.state = state;
+        command
     }
 
     /// Ends the transfer under way, if there is one, with an abort to the
@@ -267,18 +348,18 @@ impl Channel {
                 self.state = State::Idle;
                 Progress::Nothing
             }
-            State::Finished(len) => self.progress(Step::Done(len), now),
-            _ => match self.block_poll(payload) {
-                Ok(Some(command)) => self.progress(Step::Send(command), now),
-                Ok(None) => {
-                    let error = SdoError::Timeout {
-                        at: self.at,
-                        waited: self.timeout,
-                    };
-                    self.close(error, now)
-                }
-                Err(code) => self.progress(Step::Violation(code), now),
-            },
+            State::Finished => self.progress(Ok(Step::Done), now),
+            _ => {
+                let step = match self.block_poll(payload) {
+                    Ok(Some(command)) => Ok(Step::Send(command)),
+                    Ok(None) => {
+                        let (at, waited) = (self.at, self.timeout);
+                        return self.close(SdoError::Timeout { at, waited }, now);
+                    }
+                    Err(code) => Err(code.into()),
+                };
+                self.progress(step, now)
+            }
         }
     }
 
@@ -299,105 +380,114 @@ impl Channel {
         let command = Command(frame.padded());
         let step = match self.block_segment(command, payload) {
             Some(step) => step,
-            None => match command.answer() {
-                // What names an entry answers a request for that entry.
-                Some(answer) if !answer.is_addressed() || command.address() == self.at => {
-                    self.step(answer, command, payload)
-                }
-                _ => Step::Ignore,
-            },
+            None => self.answer(command, payload),
         };
         self.progress(step, now)
     }
 
-    fn step(&mut self, answer: Answer, command: Command, payload: &mut dyn Payload) -> Step {
+    fn answer(&mut self, command: Command, payload: &mut dyn Payload) -> Result<Step, Failure> {
+        let Some(answer) = command.answer() else {
+            return Ok(Step::Ignore);
+        };
+        // What names an entry answers a request for that entry.
+        if answer.is_addressed() && command.address() != self.at {
+            return Ok(Step::Ignore);
+        }
         match (self.state, answer) {
             (State::BlockDownload | State::BlockUpload, Answer::Abort)
                 if command.abort_code() == AbortCode::COMMAND =>
             {
-                self.fall_back(payload)
+                // The server does not know block transfers.
+                self.block = false;
+                Ok(Step::Send(self.begin(false, payload)))
             }
-            (_, Answer::Abort) => Step::Refused(command.abort_code()),
-            (State::Download { expedited }, Answer::Download) => {
-                self.download_begun(expedited, payload)
+            (_, Answer::Abort) => Err(Failure(Fault::Refusal, command.abort_code())),
+            (State::ExpeditedDownload, Answer::Download)
+            | (State::BlockDownloadEnd, Answer::BlockDownloadEnd) => {
+                self.done = self.size.unwrap_or(0);
+                Ok(Step::Done)
             }
-            (State::DownloadSegment { sent, toggle }, Answer::DownloadSegment) => {
-                self.segment_taken(sent, toggle, command.toggle(), payload)
+            (State::Download, Answer::Download) => Ok(Step::Send(self.next_segment(payload))),
+            (State::DownloadSegment, Answer::DownloadSegment) => {
+                self.segment_taken(command, payload)
             }
             (State::Upload | State::BlockUpload, Answer::Upload) => {
                 self.upload_begun(command, payload)
             }
-            (State::UploadSegment { toggle }, Answer::UploadSegment) => {
-                self.segment_given(toggle, command, payload)
+            (State::UploadSegment, Answer::UploadSegment) => self.segment_given(command, payload),
+            (State::BlockDownload, Answer::BlockDownload) => self.block_download_begun(command),
+            (State::BlockDownloadSegments, Answer::BlockDownloadAcknowledge) => {
+                self.block_acknowledged(command)
             }
-            (_, answer) => self.block_step(answer, command, payload),
+            (State::BlockUpload, Answer::BlockUpload) => self.block_upload_begun(command, payload),
+            (State::BlockUploadSegments, Answer::BlockUploadEnd) => {
+                self.block_upload_end(command, payload)
+            }
+            _ => Ok(Step::Ignore),
         }
     }
 
-    fn progress(&mut self, step: Step, now: Instant) -> Progress<Transfer> {
+    fn progress(&mut self, step: Result<Step, Failure>, now: Instant) -> Progress<Transfer> {
         let at = self.at;
-        match step {
-            Step::Ignore => Progress::Nothing,
-            Step::Wait => {
+        let Failure(fault, code) = match step {
+            Ok(Step::Ignore) => return Progress::Nothing,
+            Ok(Step::Wait) => {
                 self.deadline = now + self.patience();
-                Progress::Nothing
+                return Progress::Nothing;
             }
-            Step::Send(command) => Progress::Send(self.send(command, now)),
-            Step::Done(len) => {
+            Ok(Step::Send(command)) => return Progress::Send(self.send(command, now)),
+            Ok(Step::Done) => {
                 self.state = State::Idle;
-                Progress::Done(Transfer { at, len })
+                let len = self.done;
+                return Progress::Done(Transfer { at, len });
             }
-            Step::Refused(code) => {
+            Err(failure) => failure,
+        };
+        let error = match fault {
+            Fault::Refusal => {
                 self.state = State::Idle;
-                Progress::Failed(SdoError::Aborted { at, code }, None)
+                return Progress::Failed(SdoError::Aborted { at, code }, None);
             }
-            Step::Violation(code) => self.close(SdoError::Protocol { at, code }, now),
-            Step::Failed(error) => self.close(error, now),
-        }
+            Fault::Violation => SdoError::Protocol { at, code },
+            Fault::Size => SdoError::Size {
+                at,
+                announced: self.size.unwrap_or(0),
+                received: self.done,
+            },
+            Fault::Payload if code == AbortCode::OUT_OF_MEMORY => SdoError::NoRoom {
+                at,
+                size: self.size.unwrap_or(self.done),
+            },
+            Fault::Payload => SdoError::Cancelled { at, code },
+        };
+        self.close(error, now)
     }
 
-    /// The payload refused to take what came.
-    fn refused(&self, code: AbortCode, size: u32) -> Step {
-        let at = self.at;
-        Step::Failed(match code {
-            AbortCode::OUT_OF_MEMORY => SdoError::NoRoom { at, size },
-            code => SdoError::Cancelled { at, code },
-        })
+    /// An upload begins, of as many bytes as the server tells.
+    fn announced(
+        &mut self,
+        size: Option<u32>,
+        payload: &mut dyn Payload,
+    ) -> Result<(), Failure> {
+        self.size = size;
+        payload
+            .begin(size)
+            .map_err(|code| Failure(Fault::Payload, code))
     }
 
     /// Hands received bytes on, keeping to the size that was announced.
-    fn take(&mut self, data: &[u8], last: bool, payload: &mut dyn Payload) -> Result<(), Step> {
-        let len = data.len() as u32;
-        let Some(received) = self.received.checked_add(len) else {
-            return Err(Step::Violation(AbortCode::TOO_LONG));
-        };
-        let lies = |size: &u32| received > *size || last && received < *size;
-        if let Some(announced) = self.size.filter(lies) {
-            return Err(Step::Failed(SdoError::Size {
-                at: self.at,
-                announced,
-                received,
-            }));
+    fn take(&mut self, data: &[u8], last: bool, payload: &mut dyn Payload) -> Result<(), Failure> {
+        let offset = self.done;
+        let received = offset.checked_add(data.len() as u32);
+        let received = received.ok_or(AbortCode::TOO_LONG)?;
+        self.done = received;
+        let lies = |size: u32| received > size || last && received < size;
+        if self.size.is_some_and(lies) {
+            return Err(Failure(Fault::Size, AbortCode::LENGTH_MISMATCH));
         }
-        let offset = core::mem::replace(&mut self.received, received);
         payload
             .write(offset, data)
-            .map_err(|code| self.refused(code, received))
-    }
-
-    fn start(&mut self, at: Address, size: Option<u32>, now: Instant) -> Result<(), StartError> {
-        match self.state {
-            _ if self.is_ready(now) => {
-                self.at = at;
-                self.size = size;
-                self.received = 0;
-                Ok(())
-            }
-            State::Quarantine => Err(StartError::Quarantine {
-                until: self.deadline,
-            }),
-            _ => Err(StartError::Busy),
-        }
+            .map_err(|code| Failure(Fault::Payload, code))
     }
 
     fn send(&mut self, command: Command, now: Instant) -> Frame {
@@ -415,10 +505,10 @@ impl Channel {
 
     /// How long to wait in the present state.
     const fn patience(&self) -> Duration {
-        match &self.state {
-            State::Finished(_) => Duration::ZERO,
-            State::BlockDownloadSegments(sender) if sender.is_sending() => Duration::ZERO,
-            State::BlockUploadSegments(receiver) if !receiver.is_complete() => self.timeout.half(),
+        match self.state {
+            State::Finished => Duration::ZERO,
+            State::BlockDownloadSegments if self.sender.is_sending() => Duration::ZERO,
+            State::BlockUploadSegments if !self.receiver.is_complete() => self.timeout.half(),
             _ => self.timeout,
         }
     }
@@ -426,7 +516,7 @@ impl Channel {
     const fn is_active(&self) -> bool {
         !matches!(
             self.state,
-            State::Idle | State::Quarantine | State::Finished(_)
+            State::Idle | State::Quarantine | State::Finished
         )
     }
 
@@ -435,5 +525,3 @@ impl Channel {
     }
 }
 
-/// Segments per block that a client takes.
-const BLOCK_SIZE: u8 = BLOCK_MAX;

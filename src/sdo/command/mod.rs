@@ -115,15 +115,20 @@ impl Command {
         Command::addressed(code | told, at, size.unwrap_or(0).to_le_bytes())
     }
 
-    /// A segment; `None` if `data` has more than seven bytes
+    /// A segment with the first `len` bytes of `data`
     /// (CiA 301, 7.2.4.3.4, 7.2.4.3.7).
-    pub fn segment(code: u8, toggle: bool, last: bool, data: &[u8]) -> Option<Command> {
-        let Command(mut bytes) = Command::bare(code, toggle);
-        let [head, space @ ..] = &mut bytes;
-        space.get_mut(..data.len())?.copy_from_slice(data);
-        let unused = (SEGMENT_MAX - data.len()) as u8;
-        *head |= unused << UNUSED_SHIFT | u8::from(last);
-        Some(Command(bytes))
+    pub fn segment(
+        code: u8,
+        toggle: bool,
+        last: bool,
+        data: [u8; SEGMENT_MAX],
+        len: usize,
+    ) -> Command {
+        let Command([head, ..]) = Command::bare(code, toggle);
+        let unused = SEGMENT_MAX.saturating_sub(len) as u8;
+        let [a, b, c, d, e, f, g] = data;
+        let head = head | unused << UNUSED_SHIFT | u8::from(last);
+        Command([head, a, b, c, d, e, f, g])
     }
 
     /// The initiate of a block transfer by the side that sends the data and

@@ -1,11 +1,10 @@
 //! Block transfers (CiA 301, 7.2.4.3.8 .. 7.2.4.3.15).
 
-use super::transfer::{Sink, Source};
-use super::{Phase, Reply, Server, State};
+use super::{Phase, Reply, Server};
 use crate::od::ObjectDictionary;
 use crate::sdo::AbortCode;
 use crate::sdo::block::{Receiver, Sender, check_block_size};
-use crate::sdo::command::{Answer, BlockSegment, Command, End, Request, SEGMENT_MAX};
+use crate::sdo::command::{Answer, BlockSegment, Command, Request, SEGMENT_MAX};
 use crate::time::Instant;
 
 impl Server {
@@ -15,13 +14,11 @@ impl Server {
         command: Command,
         od: &mut impl ObjectDictionary,
     ) -> Reply {
-        let at = command.address();
-        let block_size = check_block_size(self.block_size).map_err(|_| AbortCode::COMMAND)?;
-        self.state = State::BlockDownload {
-            sink: Sink::open(od, at, command.block_data())?,
-            receiver: Receiver::new(block_size, command.has_crc()),
-            refused: None,
-        };
+        let (at, block_size) = (command.address(), self.block_size);
+        self.transfer.open_download(od, at, command.block_data())?;
+        self.phase = Phase::BlockDownload;
+        self.receiver = Receiver::new(block_size, command.has_crc());
+        self.refused = None;
         let code = Answer::BlockDownload.code();
         Ok(Some(Command::block_for(code, at, block_size)))
     }
@@ -40,51 +37,43 @@ impl Server {
         command: Command,
         od: &mut impl ObjectDictionary,
     ) -> Option<Reply> {
-        let State::BlockDownload {
-            sink,
-            receiver,
-            refused,
-        } = &mut self.state
-        else {
-            return None;
-        };
-        if receiver.is_complete() {
+        if self.phase != Phase::BlockDownload || self.receiver.is_complete() {
             return None;
         }
         let Some(segment) = BlockSegment::decode(command.0) else {
-            return match (command.request(), *refused) {
+            return match (command.request(), self.refused) {
                 (Some(Request::Abort), _) => None,
                 (_, Some(code)) => Some(Err(code)),
                 (_, None) => {
-                    *refused = Some(AbortCode::SEQUENCE_NUMBER);
+                    self.refused = Some(AbortCode::SEQUENCE_NUMBER);
                     Some(Ok(None))
                 }
             };
         };
-        let answer = match receiver.segment(segment) {
-            Ok(before) => {
-                if let (Some(data), None) = (before, &refused) {
-                    *refused = sink.push(od, &data, false).err();
-                }
-                let over = receiver.over();
-                over.map(|sequence| acknowledge(sequence, receiver))
-            }
+        let before = match self.receiver.segment(segment) {
+            Ok(before) => before,
             Err(code) => return Some(Err(code)),
         };
-        Some(match (answer, *refused) {
-            (Some(_), Some(code)) => Err(code),
-            (answer, _) => Ok(answer),
+        if let (Some(data), None) = (before, self.refused) {
+            self.refused = self.transfer.push(od, &data, false).err();
+        }
+        let answer = self.receiver.over();
+        Some(match self.refused {
+            Some(code) if answer.is_some() => Err(code),
+            _ => Ok(answer),
         })
     }
 
     /// CiA 301, 7.2.4.3.11.
-    pub(super) fn block_download_end(&mut self, end: End, od: &mut impl ObjectDictionary) -> Reply {
-        let State::BlockDownload { sink, receiver, .. } = &mut self.state else {
-            return Err(AbortCode::COMMAND);
-        };
-        let (data, len) = receiver.end(end)?;
-        sink.push(od, data.get(..len).unwrap_or(&data), true)?;
-        self.state = State::Idle;
+    pub(super) fn block_download_end(
+        &mut self,
+        command: Command,
+        od: &mut impl ObjectDictionary,
+    ) -> Reply {
+        let (data, len) = self.receiver.end(command.end())?;
+        let data = data.get(..len).unwrap_or(&data);
+        self.transfer.push(od, data, true)?;
+        self.phase = Phase::Idle;
         Ok(Some(Command::bare(Answer::BlockDownloadEnd.code(), false)))
     }
 
@@ -94,95 +83,48 @@ impl Server {
         command: Command,
         od: &mut impl ObjectDictionary,
     ) -> Reply {
-        if self.block_size == 0 {
-            return Err(AbortCode::COMMAND);
-        }
         let at = command.address();
         let [block_size, protocol_switch, ..] = command.tail();
         let block_size = check_block_size(block_size)?;
-        let source = Source::open(od, at)?;
-        let size = source.read(od, 0, &mut [0])?.size;
-        if protocol_switch > 0 && size.is_some_and(|size| size <= u32::from(protocol_switch)) {
+        self.transfer.open_upload(od, at)?;
+        let size = self.transfer.size;
+        if protocol_switch > 0 && size.is_some_and(|size| size <= protocol_switch.into()) {
             return self.upload(at, od);
         }
-        self.state = State::BlockUpload {
-            source,
-            sender: Sender::new(block_size, command.has_crc()),
-            phase: Phase::Start,
-        };
+        self.phase = Phase::BlockUploadStart;
+        self.sender = Sender::new(block_size, command.has_crc());
         let code = Answer::BlockUpload.code();
         Ok(Some(Command::block_of(code, at, size)))
     }
 
-    /// CiA 301, 7.2.4.3.13.
-    pub(super) fn block_upload_start(&mut self) -> Reply {
-        match &mut self.state {
-            State::BlockUpload { phase, .. } if *phase == Phase::Start => {
-                *phase = Phase::Segments;
-                Ok(None)
-            }
-            _ => Err(AbortCode::COMMAND),
-        }
-    }
-
     /// CiA 301, 7.2.4.3.14.
     pub(super) fn block_upload_acknowledge(&mut self, command: Command) -> Reply {
-        match &mut self.state {
-            State::BlockUpload { sender, phase, .. } if *phase == Phase::Segments => {
-                let end = sender.acknowledged(command)?;
-                Ok(end.map(|end| {
-                    *phase = Phase::End;
-                    Command::block_end(Answer::BlockUploadEnd.code(), end)
-                }))
-            }
-            _ => Err(AbortCode::COMMAND),
+        let end = self.sender.acknowledged(command)?;
+        if end.is_some() {
+            self.phase = Phase::BlockUploadEnd;
         }
-    }
-
-    /// CiA 301, 7.2.4.3.15.
-    pub(super) fn block_upload_end(&mut self) -> Reply {
-        match &self.state {
-            State::BlockUpload { phase, .. } if *phase == Phase::End => {
-                self.state = State::Idle;
-                Ok(None)
-            }
-            _ => Err(AbortCode::COMMAND),
-        }
+        Ok(end)
     }
 
     /// At its deadline a block upload sends the next segment, and a block
     /// download acknowledges what it has, once, so that the rest is sent again.
     pub(super) fn block_poll(&mut self, now: Instant, od: &mut impl ObjectDictionary) -> Reply {
-        let command = match &mut self.state {
-            State::BlockUpload {
-                source,
-                sender,
-                phase: Phase::Segments,
-            } => match sender.next_offset()? {
+        let command = match self.phase {
+            Phase::BlockUpload => match self.sender.next_offset()? {
                 Some(offset) => {
                     let mut data = [0; SEGMENT_MAX];
-                    let chunk = source.read(od, offset, &mut data)?;
-                    Some(Command(
-                        sender.segment(data, chunk.len, chunk.last)?.encode(),
-                    ))
+                    let chunk = self.transfer.read(od, offset, &mut data)?;
+                    Some(self.sender.segment(data, chunk.len, chunk.last)?)
                 }
                 None => None,
             },
-            State::BlockDownload {
-                refused: Some(code),
-                ..
-            } => return Err(*code),
-            State::BlockDownload { receiver, .. } => receiver
-                .stall()
-                .map(|sequence| acknowledge(sequence, receiver)),
+            Phase::BlockDownload => match self.refused {
+                Some(code) => return Err(code),
+                None => self.receiver.stall(),
+            },
             _ => None,
         };
         self.deadline = now + self.patience();
         Ok(command)
     }
-}
-
-const fn acknowledge(sequence: u8, receiver: &Receiver) -> Command {
-    let code = Answer::BlockDownloadAcknowledge.code();
-    Command::acknowledge(code, sequence, receiver.block_size())
 }

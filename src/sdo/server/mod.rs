@@ -17,7 +17,7 @@ use crate::frame::Frame;
 use crate::id::{Address, CobId, FunctionCode, NodeId};
 use crate::od::ObjectDictionary;
 use crate::time::{Duration, Instant};
-use transfer::{Sink, Source};
+use transfer::Transfer;
 
 /// For an abort that answers a frame without index and sub-index.
 const NOWHERE: Address = Address::new(0, 0);
@@ -31,43 +31,35 @@ pub struct Server {
     /// Segments per block that this server takes; 0: no block transfer.
     block_size: u8,
     deadline: Instant,
-    state: State,
+    phase: Phase,
+    /// The entry that is transferred, unless idle.
+    transfer: Transfer,
+    /// The toggle bit of the next segment, or of the next request for one.
+    toggle: bool,
+    /// This end of a block upload.
+    sender: Sender,
+    /// This end of a block download.
+    receiver: Receiver,
+    /// In a block download, the entry has refused what came.
+    refused: Option<AbortCode>,
 }
 
-#[derive(Clone, Debug)]
-enum State {
-    Idle,
-    Download {
-        sink: Sink,
-        toggle: bool,
-    },
-    Upload {
-        source: Source,
-        toggle: bool,
-        offset: u32,
-    },
-    BlockDownload {
-        sink: Sink,
-        receiver: Receiver,
-        /// The entry has refused what came.
-        refused: Option<AbortCode>,
-    },
-    BlockUpload {
-        source: Source,
-        sender: Sender,
-        phase: Phase,
-    },
-}
-
-/// What a block upload waits for.
+/// Which transfer is under way, and what it waits for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
+    Idle,
+    /// A segment.
+    Download,
+    /// A request for a segment.
+    Upload,
+    /// Segments, or the end command.
+    BlockDownload,
     /// The client's start command.
-    Start,
+    BlockUploadStart,
     /// Segments to be sent, or their acknowledgement.
-    Segments,
+    BlockUpload,
     /// The client's end command.
-    End,
+    BlockUploadEnd,
 }
 
 /// What the client is told, or nothing.
@@ -83,7 +75,12 @@ impl Server {
             timeout,
             block_size: BLOCK_MAX,
             deadline: Instant::ZERO,
-            state: State::Idle,
+            phase: Phase::Idle,
+            transfer: Transfer::NONE,
+            toggle: false,
+            sender: Sender::new(BLOCK_MAX, false),
+            receiver: Receiver::new(BLOCK_MAX, false),
+            refused: None,
         }
     }
 
@@ -106,23 +103,24 @@ impl Server {
 
     /// Whether no transfer is under way.
     pub const fn is_idle(&self) -> bool {
-        matches!(self.state, State::Idle)
+        matches!(self.phase, Phase::Idle)
     }
 
     /// Ends any transfer without a word: NMT reset, or the service is no
     /// longer allowed.
     pub fn reset(&mut self, od: &mut impl ObjectDictionary) {
-        if let State::Download { sink, .. } | State::BlockDownload { sink, .. } = &self.state {
-            sink.cancel(od);
+        if let Phase::Download | Phase::BlockDownload = self.phase {
+            self.transfer.cancel(od);
         }
-        self.state = State::Idle;
+        self.phase = Phase::Idle;
+        self.toggle = false;
     }
 
     /// When [`poll`](Server::poll) has something to do. In the middle of a
     /// block upload that is at once, as soon as there is room for a frame.
     pub const fn next_deadline(&self) -> Option<Instant> {
-        match self.state {
-            State::Idle => None,
+        match self.phase {
+            Phase::Idle => None,
             _ => Some(self.deadline),
         }
     }
@@ -131,16 +129,15 @@ impl Server {
     /// notices transfers that stand still. To be called until it returns
     /// `None`, or until there is no room for another frame.
     pub fn poll(&mut self, now: Instant, od: &mut impl ObjectDictionary) -> Option<Frame> {
-        let at = self.address()?;
-        if now < self.deadline {
+        if self.is_idle() || now < self.deadline {
             return None;
         }
-        let command = match self.block_poll(now, od) {
-            Ok(Some(command)) => command,
-            Ok(None) => self.abort(at, AbortCode::TIMEOUT, od),
-            Err(code) => self.abort(at, code, od),
+        let reply = self.block_poll(now, od);
+        let answer = match reply.and_then(|command| command.ok_or(AbortCode::TIMEOUT)) {
+            Ok(command) => command,
+            Err(code) => self.abort(self.transfer.at, code, od),
         };
-        Some(Frame::full(self.response, command.0))
+        Some(Frame::full(self.response, answer.0))
     }
 
     /// Serves a frame. Frames for others and frames without eight bytes are
@@ -155,15 +152,18 @@ impl Server {
             return None;
         }
         let command = Command(frame.padded());
-        let mut at = self.address();
+        let mut at = match self.phase {
+            Phase::Idle => NOWHERE,
+            _ => self.transfer.at,
+        };
         let reply = match self.block_segment(command, od) {
             Some(reply) => reply,
             None => {
                 let request = command.request();
                 // An initiate names its entry; everything else belongs to the
                 // transfer that is under way.
-                if request.map_or(at.is_none(), Request::is_addressed) {
-                    at = Some(command.address());
+                if request.map_or(self.is_idle(), Request::is_addressed) {
+                    at = command.address();
                 }
                 self.serve(request, command, od)
             }
@@ -171,7 +171,7 @@ impl Server {
         self.deadline = now + self.patience();
         let answer = match reply {
             Ok(answer) => answer?,
-            Err(code) => self.abort(at.unwrap_or(NOWHERE), code, od),
+            Err(code) => self.abort(at, code, od),
         };
         Some(Frame::full(self.response, answer.0))
     }
@@ -187,30 +187,41 @@ impl Server {
             // An initiate, or an abort: the transfer under way is over.
             self.reset(od);
         }
-        match request {
-            Request::Download => self.download(command, od),
-            Request::Upload => self.upload(command.address(), od),
-            Request::DownloadSegment => self.download_segment(command, od),
-            Request::UploadSegment => self.upload_segment(command.toggle(), od),
-            Request::BlockDownload => self.block_download(command, od),
-            Request::BlockDownloadEnd => self.block_download_end(command.end(), od),
-            Request::BlockUpload => self.block_upload(command, od),
-            Request::BlockUploadStart => self.block_upload_start(),
-            Request::BlockUploadAcknowledge => self.block_upload_acknowledge(command),
-            Request::BlockUploadEnd => self.block_upload_end(),
-            Request::Abort => Ok(None),
+        let at = command.address();
+        match (request, self.phase) {
+            (Request::Abort, _) => Ok(None),
+            (Request::Download, _) => self.download(command, od),
+            (Request::Upload, _) => {
+                self.transfer.open_upload(od, at)?;
+                self.upload(at, od)
+            }
+            (Request::BlockDownload, _) if self.block_size > 0 => self.block_download(command, od),
+            (Request::BlockUpload, _) if self.block_size > 0 => self.block_upload(command, od),
+            (Request::DownloadSegment, Phase::Download) => self.download_segment(command, od),
+            (Request::UploadSegment, Phase::Upload) => self.upload_segment(command, od),
+            (Request::BlockDownloadEnd, Phase::BlockDownload) => {
+                self.block_download_end(command, od)
+            }
+            (Request::BlockUploadStart, Phase::BlockUploadStart) => {
+                self.phase = Phase::BlockUpload;
+                Ok(None)
+            }
+            (Request::BlockUploadAcknowledge, Phase::BlockUpload) => {
+                self.block_upload_acknowledge(command)
+            }
+            (Request::BlockUploadEnd, Phase::BlockUploadEnd) => {
+                self.phase = Phase::Idle;
+                Ok(None)
+            }
+            _ => Err(AbortCode::COMMAND),
         }
     }
 
     /// How long the client may be silent.
     const fn patience(&self) -> Duration {
-        match &self.state {
-            State::BlockUpload {
-                sender,
-                phase: Phase::Segments,
-                ..
-            } if sender.is_sending() => Duration::ZERO,
-            State::BlockDownload { receiver, .. } if !receiver.is_complete() => self.timeout.half(),
+        match self.phase {
+            Phase::BlockUpload if self.sender.is_sending() => Duration::ZERO,
+            Phase::BlockDownload if !self.receiver.is_complete() => self.timeout.half(),
             _ => self.timeout,
         }
     }
@@ -218,14 +229,5 @@ impl Server {
     fn abort(&mut self, at: Address, code: AbortCode, od: &mut impl ObjectDictionary) -> Command {
         self.reset(od);
         Command::abort(at, code)
-    }
-
-    /// The entry of the transfer under way.
-    const fn address(&self) -> Option<Address> {
-        match &self.state {
-            State::Idle => None,
-            State::Download { sink, .. } | State::BlockDownload { sink, .. } => Some(sink.at),
-            State::Upload { source, .. } | State::BlockUpload { source, .. } => Some(source.at),
-        }
     }
 }

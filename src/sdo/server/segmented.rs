@@ -1,7 +1,6 @@
 //! Expedited and segmented transfers (CiA 301, 7.2.4.3.3 .. 7.2.4.3.7).
 
-use super::transfer::{Sink, Source};
-use super::{Reply, Server, State};
+use super::{Phase, Reply, Server};
 use crate::id::Address;
 use crate::od::ObjectDictionary;
 use crate::sdo::AbortCode;
@@ -11,25 +10,18 @@ impl Server {
     /// CiA 301, 7.2.4.3.3.
     pub(super) fn download(&mut self, command: Command, od: &mut impl ObjectDictionary) -> Reply {
         let (at, size) = (command.address(), command.size());
-        let mut sink = Sink::open(od, at, size)?;
+        let transfer = &mut self.transfer;
+        transfer.open_download(od, at, size)?;
+        self.phase = Phase::Download;
         if command.is_expedited() {
             // Without a length the type decides.
-            let len = match (size, sink.fixed_size()) {
-                (Some(size), _) => size as usize,
-                (None, Some(size)) if size > EXPEDITED_MAX => {
-                    return Err(AbortCode::TOO_SHORT);
-                }
-                (None, Some(size)) => size,
-                (None, None) => EXPEDITED_MAX,
+            let len = match size {
+                Some(size) => size as usize,
+                None => transfer.fixed_size().unwrap_or(EXPEDITED_MAX),
             };
             let data = command.tail();
-            sink.push(od, data.get(..len).unwrap_or(&data), true)
-                .inspect_err(|_| sink.cancel(od))?;
-        } else {
-            self.state = State::Download {
-                sink,
-                toggle: false,
-            };
+            transfer.push(od, data.get(..len).unwrap_or(&data), true)?;
+            self.phase = Phase::Idle;
         }
         let code = Answer::Download.code();
         Ok(Some(Command::addressed(code, at, [0; 4])))
@@ -41,29 +33,24 @@ impl Server {
         segment: Command,
         od: &mut impl ObjectDictionary,
     ) -> Reply {
-        let State::Download { sink, toggle } = &mut self.state else {
-            return Err(AbortCode::COMMAND);
-        };
-        if segment.toggle() != *toggle {
-            return Err(AbortCode::TOGGLE);
-        }
+        let toggle = self.toggled(segment)?;
         if segment.is_fruitless() {
             return Err(AbortCode::COMMAND);
         }
-        sink.push(od, segment.data(), segment.is_last())?;
-        *toggle = !*toggle;
-        if segment.is_last() {
-            self.state = State::Idle;
+        let last = segment.is_last();
+        self.transfer.push(od, segment.data(), last)?;
+        if last {
+            self.phase = Phase::Idle;
         }
         let code = Answer::DownloadSegment.code();
-        Ok(Some(Command::bare(code, segment.toggle())))
+        Ok(Some(Command::bare(code, toggle)))
     }
 
     /// CiA 301, 7.2.4.3.6.
     pub(super) fn upload(&mut self, at: Address, od: &mut impl ObjectDictionary) -> Reply {
-        let source = Source::open(od, at)?;
+        let transfer = &mut self.transfer;
         let mut first = [0; EXPEDITED_MAX];
-        let chunk = source.read(od, 0, &mut first)?;
+        let chunk = transfer.read(od, 0, &mut first)?;
         let code = Answer::Upload.code();
         if chunk.last
             && let Some(whole) = first.get(..chunk.len)
@@ -71,42 +58,35 @@ impl Server {
         {
             return Ok(Some(answer));
         }
-        self.state = State::Upload {
-            source,
-            toggle: false,
-            offset: 0,
-        };
+        self.phase = Phase::Upload;
         Ok(Some(Command::segmented(code, at, chunk.size)))
     }
 
     /// CiA 301, 7.2.4.3.7.
-    pub(super) fn upload_segment(&mut self, asked: bool, od: &mut impl ObjectDictionary) -> Reply {
-        let State::Upload {
-            source,
-            toggle,
-            offset,
-        } = &mut self.state
-        else {
-            return Err(AbortCode::COMMAND);
-        };
-        if asked != *toggle {
+    pub(super) fn upload_segment(
+        &mut self,
+        request: Command,
+        od: &mut impl ObjectDictionary,
+    ) -> Reply {
+        let toggle = self.toggled(request)?;
+        let mut data = [0; SEGMENT_MAX];
+        let chunk = self.transfer.next(od, &mut data)?;
+        if chunk.last {
+            self.phase = Phase::Idle;
+        }
+        let code = Answer::UploadSegment.code();
+        Ok(Some(Command::segment(
+            code, toggle, chunk.last, data, chunk.len,
+        )))
+    }
+
+    /// The toggle bit of a request, which alternates from one to the next.
+    fn toggled(&mut self, request: Command) -> Result<bool, AbortCode> {
+        let toggle = request.toggle();
+        if toggle != self.toggle {
             return Err(AbortCode::TOGGLE);
         }
-        let mut data = [0; SEGMENT_MAX];
-        let chunk = source.read(od, *offset, &mut data)?;
-        if chunk.len < SEGMENT_MAX && !chunk.last {
-            return Err(AbortCode::GENERAL);
-        }
-        let data = data.get(..chunk.len).unwrap_or(&[]);
-        let code = Answer::UploadSegment.code();
-        let segment = Command::segment(code, asked, chunk.last, data).ok_or(AbortCode::GENERAL)?;
-        *toggle = !*toggle;
-        *offset = offset
-            .checked_add(chunk.len as u32)
-            .ok_or(AbortCode::GENERAL)?;
-        if chunk.last {
-            self.state = State::Idle;
-        }
-        Ok(Some(segment))
+        self.toggle = !toggle;
+        Ok(toggle)
     }
 }
