@@ -107,7 +107,7 @@ impl Sender {
 
     /// The receiver tells how many segments of the block it has and how many it
     /// wants in the next. Yields the end command once it has everything.
-    pub(super) fn acknowledged(&mut self, command: Command) -> Result<Option<Command>, AbortCode> {
+    pub(super) fn acknowledged(&mut self, command: &Command) -> Result<Option<Command>, AbortCode> {
         let (sequence, block_size) = command.acknowledged();
         if sequence > self.sequence {
             return Err(AbortCode::SEQUENCE_NUMBER);

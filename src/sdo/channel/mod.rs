@@ -122,6 +122,8 @@ pub struct Channel {
     sender: Sender,
     /// This end of a block upload.
     receiver: Receiver,
+    /// What the server is to be asked or told next.
+    request: Command,
 }
 
 /// What is awaited.
@@ -154,12 +156,14 @@ enum State {
 }
 
 /// What an answer comes to.
+#[derive(Clone, Copy)]
 enum Step {
     /// Wait on.
     Wait,
     /// Not an answer to what was asked: wait on, the timeout keeps running.
     Ignore,
-    Send(Command),
+    /// Send the request.
+    Send,
     Done,
 }
 
@@ -202,6 +206,7 @@ impl Channel {
             toggle: false,
             sender: Sender::new(BLOCK_MAX, false),
             receiver: Receiver::new(BLOCK_MAX, false),
+            request: Command([0; 8]),
         }
     }
 
@@ -282,21 +287,20 @@ impl Channel {
         self.at = at;
         self.size = size;
         self.done = 0;
-        let block = protocol == Protocol::Block && self.block;
-        let request = self.begin(block, payload);
-        Ok(self.send(request, now))
+        self.begin(protocol == Protocol::Block && self.block, payload);
+        Ok(self.send(now))
     }
 
-    /// The initiate of a transfer (CiA 301, 7.2.4.3.3, 7.2.4.3.6, 7.2.4.3.9,
-    /// 7.2.4.3.13).
-    fn begin(&mut self, block: bool, payload: &mut dyn Payload) -> Command {
+    /// Prepares the initiate of a transfer (CiA 301, 7.2.4.3.3, 7.2.4.3.6,
+    /// 7.2.4.3.9, 7.2.4.3.13).
+    fn begin(&mut self, block: bool, payload: &mut dyn Payload) {
         let (at, size) = (self.at, self.size);
-        let (state, command) = match (size, block) {
+        (self.state, self.request) = match (size, block) {
             (Some(_), true) => (
                 State::BlockDownload,
                 Command::block_of(Request::BlockDownload.code(), at, size),
             ),
-            (Some(size), false) => return self.begin_download(size, payload),
+            (Some(size), false) => self.download_initiate(size, payload),
             (None, true) => (
                 State::BlockUpload,
                 Command::block_for(Request::BlockUpload.code(), at, BLOCK_SIZE),
@@ -306,8 +310,6 @@ impl Channel {
                 Command::addressed(Request::Upload.code(), at, [0; 4]),
             ),
         };
-        self.state = state;
-        command
     }
 
     /// Ends the transfer under way, if there is one, with an abort to the
@@ -351,8 +353,8 @@ impl Channel {
             State::Finished => self.progress(Ok(Step::Done), now),
             _ => {
                 let step = match self.block_poll(payload) {
-                    Ok(Some(command)) => Ok(Step::Send(command)),
-                    Ok(None) => {
+                    Ok(true) => Ok(Step::Send),
+                    Ok(false) => {
                         let (at, waited) = (self.at, self.timeout);
                         return self.close(SdoError::Timeout { at, waited }, now);
                     }
@@ -378,14 +380,17 @@ impl Channel {
             return Progress::Nothing;
         }
         let command = Command(frame.padded());
-        let step = match self.block_segment(command, payload) {
-            Some(step) => step,
-            None => self.answer(command, payload),
+        let step = match self.is_block_segment(&command) {
+            true => self.block_segment(&command, payload),
+            false => self.answer(&command, payload),
         };
         self.progress(step, now)
     }
 
-    fn answer(&mut self, command: Command, payload: &mut dyn Payload) -> Result<Step, Failure> {
+    /// Its own function, so that the command stays in memory: in registers its
+    /// fields would be shifted out again and again, for 120 bytes more of flash.
+    #[inline(never)]
+    fn answer(&mut self, command: &Command, payload: &mut dyn Payload) -> Result<Step, Failure> {
         let Some(answer) = command.answer() else {
             return Ok(Step::Ignore);
         };
@@ -399,7 +404,8 @@ impl Channel {
             {
                 // The server does not know block transfers.
                 self.block = false;
-                Ok(Step::Send(self.begin(false, payload)))
+                self.begin(false, payload);
+                Ok(Step::Send)
             }
             (_, Answer::Abort) => Err(Failure(Fault::Refusal, command.abort_code())),
             (State::ExpeditedDownload, Answer::Download)
@@ -407,7 +413,7 @@ impl Channel {
                 self.done = self.size.unwrap_or(0);
                 Ok(Step::Done)
             }
-            (State::Download, Answer::Download) => Ok(Step::Send(self.next_segment(payload))),
+            (State::Download, Answer::Download) => Ok(self.next_segment(payload)),
             (State::DownloadSegment, Answer::DownloadSegment) => {
                 self.segment_taken(command, payload)
             }
@@ -435,7 +441,7 @@ impl Channel {
                 self.deadline = now + self.patience();
                 return Progress::Nothing;
             }
-            Ok(Step::Send(command)) => return Progress::Send(self.send(command, now)),
+            Ok(Step::Send) => return Progress::Send(self.send(now)),
             Ok(Step::Done) => {
                 self.state = State::Idle;
                 let len = self.done;
@@ -490,17 +496,17 @@ impl Channel {
             .map_err(|code| Failure(Fault::Payload, code))
     }
 
-    fn send(&mut self, command: Command, now: Instant) -> Frame {
+    fn send(&mut self, now: Instant) -> Frame {
         self.deadline = now + self.patience();
-        self.frame(command)
+        self.frame()
     }
 
     /// Fails the transfer, tells the server, and keeps the channel closed.
     fn close(&mut self, error: SdoError, now: Instant) -> Progress<Transfer> {
         self.state = State::Quarantine;
         self.deadline = now + self.quarantine;
-        let abort = Command::abort(error.address(), error.code());
-        Progress::Failed(error, Some(self.frame(abort)))
+        self.request = Command::abort(self.at, error.code());
+        Progress::Failed(error, Some(self.frame()))
     }
 
     /// How long to wait in the present state.
@@ -520,8 +526,8 @@ impl Channel {
         )
     }
 
-    fn frame(&self, command: Command) -> Frame {
-        Frame::full(CobId::of(FunctionCode::SdoRequest, self.node), command.0)
+    fn frame(&self) -> Frame {
+        Frame::full(CobId::of(FunctionCode::SdoRequest, self.node), self.request.0)
     }
 }
 

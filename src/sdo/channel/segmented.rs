@@ -6,37 +6,40 @@ use crate::sdo::command::{Command, EXPEDITED_MAX, Request, SEGMENT_MAX};
 
 impl Channel {
     /// CiA 301, 7.2.4.3.3.
-    pub(super) fn begin_download(&mut self, size: u32, payload: &mut dyn Payload) -> Command {
+    pub(super) fn download_initiate(
+        &mut self,
+        size: u32,
+        payload: &mut dyn Payload,
+    ) -> (State, Command) {
         let code = Request::Download.code();
         let mut data = [0; EXPEDITED_MAX];
         if let Some(space) = data.get_mut(..size as usize) {
             payload.read(0, space);
             if let Some(expedited) = Command::expedited(code, self.at, space) {
-                self.state = State::ExpeditedDownload;
-                return expedited;
+                return (State::ExpeditedDownload, expedited);
             }
         }
-        self.state = State::Download;
         // Turned before the first segment.
         self.toggle = true;
-        Command::segmented(code, self.at, Some(size))
+        let command = Command::segmented(code, self.at, Some(size));
+        (State::Download, command)
     }
 
     /// CiA 301, 7.2.4.3.4.
     pub(super) fn segment_taken(
         &mut self,
-        command: Command,
+        command: &Command,
         payload: &mut dyn Payload,
     ) -> Result<Step, Failure> {
         self.toggled(command)?;
         Ok(if self.left(self.done) == 0 {
             Step::Done
         } else {
-            Step::Send(self.next_segment(payload))
+            self.next_segment(payload)
         })
     }
 
-    pub(super) fn next_segment(&mut self, payload: &mut dyn Payload) -> Command {
+    pub(super) fn next_segment(&mut self, payload: &mut dyn Payload) -> Step {
         self.state = State::DownloadSegment;
         self.toggle = !self.toggle;
         let left = self.left(self.done);
@@ -45,7 +48,8 @@ impl Channel {
         payload.read(self.done, data.get_mut(..len).unwrap_or(&mut []));
         self.done += len as u32;
         let code = Request::DownloadSegment.code();
-        Command::segment(code, self.toggle, len == left, data, len)
+        self.request = Command::segment(code, self.toggle, len == left, data, len);
+        Step::Send
     }
 
     /// How many bytes of a download there are from `offset` on.
@@ -56,7 +60,7 @@ impl Channel {
     /// CiA 301, 7.2.4.3.6. A block upload may be answered like this, too.
     pub(super) fn upload_begun(
         &mut self,
-        command: Command,
+        command: &Command,
         payload: &mut dyn Payload,
     ) -> Result<Step, Failure> {
         let size = command.size();
@@ -76,13 +80,14 @@ impl Channel {
     fn ask_segment(&mut self) -> Step {
         self.state = State::UploadSegment;
         self.toggle = !self.toggle;
-        Step::Send(Command::bare(Request::UploadSegment.code(), self.toggle))
+        self.request = Command::bare(Request::UploadSegment.code(), self.toggle);
+        Step::Send
     }
 
     /// CiA 301, 7.2.4.3.7.
     pub(super) fn segment_given(
         &mut self,
-        segment: Command,
+        segment: &Command,
         payload: &mut dyn Payload,
     ) -> Result<Step, Failure> {
         self.toggled(segment)?;
@@ -94,7 +99,7 @@ impl Channel {
         Ok(if last { Step::Done } else { self.ask_segment() })
     }
 
-    fn toggled(&self, answer: Command) -> Result<(), AbortCode> {
+    fn toggled(&self, answer: &Command) -> Result<(), AbortCode> {
         if answer.toggle() == self.toggle {
             Ok(())
         } else {

@@ -198,6 +198,12 @@ impl Command {
         [a, b, c, d]
     }
 
+    /// An abort where segments of a block are awaited: those have a sequence
+    /// number in its unused bits.
+    pub(super) const fn is_bare_abort(&self) -> bool {
+        self.head() == Request::Abort.code()
+    }
+
     /// Why a transfer is aborted.
     pub const fn abort_code(&self) -> AbortCode {
         AbortCode(u32::from_le_bytes(self.tail()))

@@ -42,6 +42,8 @@ pub struct Server {
     receiver: Receiver,
     /// In a block download, the entry has refused what came.
     refused: Option<AbortCode>,
+    /// What the client is to be told next.
+    answer: Option<Command>,
 }
 
 /// Which transfer is under way, and what it waits for.
@@ -62,8 +64,8 @@ enum Phase {
     BlockUploadEnd,
 }
 
-/// What the client is told, or nothing.
-type Reply = Result<Option<Command>, AbortCode>;
+/// Whether what the client wants can be done: if not, the transfer is aborted.
+type Outcome = Result<(), AbortCode>;
 
 impl Server {
     /// The default server of `node`: requests on 600h + node-ID, answers on
@@ -81,6 +83,7 @@ impl Server {
             sender: Sender::new(BLOCK_MAX, false),
             receiver: Receiver::new(BLOCK_MAX, false),
             refused: None,
+            answer: None,
         }
     }
 
@@ -132,12 +135,8 @@ impl Server {
         if self.is_idle() || now < self.deadline {
             return None;
         }
-        let reply = self.block_poll(now, od);
-        let answer = match reply.and_then(|command| command.ok_or(AbortCode::TIMEOUT)) {
-            Ok(command) => command,
-            Err(code) => self.abort(self.transfer.at, code, od),
-        };
-        Some(Frame::full(self.response, answer.0))
+        let outcome = self.block_poll(od);
+        self.reply(self.transfer.at, outcome, now, od)
     }
 
     /// Serves a frame. Frames for others and frames without eight bytes are
@@ -152,69 +151,78 @@ impl Server {
             return None;
         }
         let command = Command(frame.padded());
-        let mut at = match self.phase {
+        let at = match self.phase {
             Phase::Idle => NOWHERE,
             _ => self.transfer.at,
         };
-        let reply = match self.block_segment(command, od) {
-            Some(reply) => reply,
-            None => {
-                let request = command.request();
-                // An initiate names its entry; everything else belongs to the
-                // transfer that is under way.
-                if request.map_or(self.is_idle(), Request::is_addressed) {
-                    at = command.address();
-                }
-                self.serve(request, command, od)
-            }
+        if self.is_block_segment(&command) {
+            let outcome = self.block_segment(&command, od);
+            return self.reply(at, outcome, now, od);
+        }
+        let request = command.request();
+        // An initiate names its entry; everything else belongs to the transfer
+        // that is under way.
+        let at = match request.map_or(self.is_idle(), Request::is_addressed) {
+            true => command.address(),
+            false => at,
         };
-        self.deadline = now + self.patience();
-        let answer = match reply {
-            Ok(answer) => answer?,
-            Err(code) => self.abort(at, code, od),
-        };
-        Some(Frame::full(self.response, answer.0))
+        let outcome = self.serve(request, &command, od);
+        self.reply(at, outcome, now, od)
     }
 
+    /// Its own function, so that the command stays in memory: in registers its
+    /// fields would be shifted out again and again, for 300 bytes more of flash.
+    #[inline(never)]
     fn serve(
         &mut self,
         request: Option<Request>,
-        command: Command,
+        command: &Command,
         od: &mut impl ObjectDictionary,
-    ) -> Reply {
+    ) -> Outcome {
         let request = request.ok_or(AbortCode::COMMAND)?;
         if request.is_addressed() {
             // An initiate, or an abort: the transfer under way is over.
             self.reset(od);
         }
-        let at = command.address();
         match (request, self.phase) {
-            (Request::Abort, _) => Ok(None),
-            (Request::Download, _) => self.download(command, od),
+            (Request::Abort, _) => {}
+            (Request::Download, _) => self.download(command, od)?,
             (Request::Upload, _) => {
-                self.transfer.open_upload(od, at)?;
-                self.upload(at, od)
+                self.transfer.open_upload(od, command.address())?;
+                self.upload(od)?;
             }
-            (Request::BlockDownload, _) if self.block_size > 0 => self.block_download(command, od),
-            (Request::BlockUpload, _) if self.block_size > 0 => self.block_upload(command, od),
-            (Request::DownloadSegment, Phase::Download) => self.download_segment(command, od),
-            (Request::UploadSegment, Phase::Upload) => self.upload_segment(command, od),
+            (Request::BlockDownload, _) if self.block_size > 0 => self.block_download(command, od)?,
+            (Request::BlockUpload, _) if self.block_size > 0 => self.block_upload(command, od)?,
+            (Request::DownloadSegment, Phase::Download) => self.download_segment(command, od)?,
+            (Request::UploadSegment, Phase::Upload) => self.upload_segment(command, od)?,
             (Request::BlockDownloadEnd, Phase::BlockDownload) => {
-                self.block_download_end(command, od)
+                self.block_download_end(command, od)?;
             }
-            (Request::BlockUploadStart, Phase::BlockUploadStart) => {
-                self.phase = Phase::BlockUpload;
-                Ok(None)
-            }
+            (Request::BlockUploadStart, Phase::BlockUploadStart) => self.phase = Phase::BlockUpload,
             (Request::BlockUploadAcknowledge, Phase::BlockUpload) => {
-                self.block_upload_acknowledge(command)
+                self.block_upload_acknowledge(command)?;
             }
-            (Request::BlockUploadEnd, Phase::BlockUploadEnd) => {
-                self.phase = Phase::Idle;
-                Ok(None)
-            }
-            _ => Err(AbortCode::COMMAND),
+            (Request::BlockUploadEnd, Phase::BlockUploadEnd) => self.phase = Phase::Idle,
+            _ => return Err(AbortCode::COMMAND),
         }
+        Ok(())
+    }
+
+    /// What the client is told, if anything.
+    fn reply(
+        &mut self,
+        at: Address,
+        outcome: Outcome,
+        now: Instant,
+        od: &mut impl ObjectDictionary,
+    ) -> Option<Frame> {
+        self.deadline = now + self.patience();
+        if let Err(code) = outcome {
+            self.reset(od);
+            self.answer = Some(Command::abort(at, code));
+        }
+        let answer = self.answer.take()?;
+        Some(Frame::full(self.response, answer.0))
     }
 
     /// How long the client may be silent.
@@ -224,10 +232,5 @@ impl Server {
             Phase::BlockDownload if !self.receiver.is_complete() => self.timeout.half(),
             _ => self.timeout,
         }
-    }
-
-    fn abort(&mut self, at: Address, code: AbortCode, od: &mut impl ObjectDictionary) -> Command {
-        self.reset(od);
-        Command::abort(at, code)
     }
 }

@@ -1,14 +1,13 @@
 //! Expedited and segmented transfers (CiA 301, 7.2.4.3.3 .. 7.2.4.3.7).
 
-use super::{Phase, Reply, Server};
-use crate::id::Address;
+use super::{Outcome, Phase, Server};
 use crate::od::ObjectDictionary;
 use crate::sdo::AbortCode;
 use crate::sdo::command::{Answer, Command, EXPEDITED_MAX, SEGMENT_MAX};
 
 impl Server {
     /// CiA 301, 7.2.4.3.3.
-    pub(super) fn download(&mut self, command: Command, od: &mut impl ObjectDictionary) -> Reply {
+    pub(super) fn download(&mut self, command: &Command, od: &mut impl ObjectDictionary) -> Outcome {
         let (at, size) = (command.address(), command.size());
         let transfer = &mut self.transfer;
         transfer.open_download(od, at, size)?;
@@ -24,15 +23,16 @@ impl Server {
             self.phase = Phase::Idle;
         }
         let code = Answer::Download.code();
-        Ok(Some(Command::addressed(code, at, [0; 4])))
+        self.answer = Some(Command::addressed(code, at, [0; 4]));
+        Ok(())
     }
 
     /// CiA 301, 7.2.4.3.4.
     pub(super) fn download_segment(
         &mut self,
-        segment: Command,
+        segment: &Command,
         od: &mut impl ObjectDictionary,
-    ) -> Reply {
+    ) -> Outcome {
         let toggle = self.toggled(segment)?;
         if segment.is_fruitless() {
             return Err(AbortCode::COMMAND);
@@ -43,31 +43,30 @@ impl Server {
             self.phase = Phase::Idle;
         }
         let code = Answer::DownloadSegment.code();
-        Ok(Some(Command::bare(code, toggle)))
+        self.answer = Some(Command::bare(code, toggle));
+        Ok(())
     }
 
     /// CiA 301, 7.2.4.3.6.
-    pub(super) fn upload(&mut self, at: Address, od: &mut impl ObjectDictionary) -> Reply {
-        let transfer = &mut self.transfer;
+    pub(super) fn upload(&mut self, od: &mut impl ObjectDictionary) -> Outcome {
         let mut first = [0; EXPEDITED_MAX];
-        let chunk = transfer.read(od, 0, &mut first)?;
-        let code = Answer::Upload.code();
-        if chunk.last
-            && let Some(whole) = first.get(..chunk.len)
-            && let Some(answer) = Command::expedited(code, at, whole)
-        {
-            return Ok(Some(answer));
+        let chunk = self.transfer.read(od, 0, &mut first)?;
+        let (code, at) = (Answer::Upload.code(), self.transfer.at);
+        let whole = first.get(..chunk.len).filter(|_| chunk.last);
+        self.answer = whole.and_then(|whole| Command::expedited(code, at, whole));
+        if self.answer.is_none() {
+            self.phase = Phase::Upload;
+            self.answer = Some(Command::segmented(code, at, chunk.size));
         }
-        self.phase = Phase::Upload;
-        Ok(Some(Command::segmented(code, at, chunk.size)))
+        Ok(())
     }
 
     /// CiA 301, 7.2.4.3.7.
     pub(super) fn upload_segment(
         &mut self,
-        request: Command,
+        request: &Command,
         od: &mut impl ObjectDictionary,
-    ) -> Reply {
+    ) -> Outcome {
         let toggle = self.toggled(request)?;
         let mut data = [0; SEGMENT_MAX];
         let chunk = self.transfer.next(od, &mut data)?;
@@ -75,13 +74,12 @@ impl Server {
             self.phase = Phase::Idle;
         }
         let code = Answer::UploadSegment.code();
-        Ok(Some(Command::segment(
-            code, toggle, chunk.last, data, chunk.len,
-        )))
+        self.answer = Some(Command::segment(code, toggle, chunk.last, data, chunk.len));
+        Ok(())
     }
 
     /// The toggle bit of a request, which alternates from one to the next.
-    fn toggled(&mut self, request: Command) -> Result<bool, AbortCode> {
+    fn toggled(&mut self, request: &Command) -> Result<bool, AbortCode> {
         let toggle = request.toggle();
         if toggle != self.toggle {
             return Err(AbortCode::TOGGLE);
