@@ -103,9 +103,51 @@ const TEXTS: [(u16, u16, &str); 83] = [
     (0xFF00, 0xFFFF, "device specific"),
 ];
 
-/// First code, last code, and where its words end in [`WORDS`]; they begin where
-/// those of the entry before it end.
-static ENDS: [(u16, u16, u16); TEXTS.len()] = ends();
+/// A line of [`TEXTS`] in four bytes.
+struct Entry {
+    first: u16,
+    /// How many codes follow the first one, by its place in [`SPANS`].
+    span: u8,
+    /// How many letters the words have. They begin in [`WORDS`] where those of the
+    /// entry before end.
+    letters: u8,
+}
+
+/// How many codes follow the first one of an entry.
+const SPANS: [u16; 8] = [0x000, 0x002, 0x003, 0x008, 0x013, 0x070, 0x0FF, 0xFFF];
+
+static ENTRIES: [Entry; TEXTS.len()] = entries();
+
+impl Entry {
+    const NONE: Entry = Entry {
+        first: 0,
+        span: 0,
+        letters: 0,
+    };
+
+    /// # Panics
+    /// While it is compiled, if there is no such span, or too many letters.
+    const fn new(first: u16, last: u16, text: &str) -> Entry {
+        assert!(text.len() <= u8::MAX as usize, "the words are too long");
+        let mut spans: &[u16] = &SPANS;
+        while let [others @ .., span] = spans {
+            if last - first == *span {
+                return Entry {
+                    first,
+                    span: others.len() as u8,
+                    letters: text.len() as u8,
+                };
+            }
+            spans = others;
+        }
+        panic!("a span that is not in the list")
+    }
+
+    fn contains(&self, code: u16) -> bool {
+        let span = SPANS.get(usize::from(self.span)).copied().unwrap_or(0);
+        code.wrapping_sub(self.first) <= span
+    }
+}
 
 static WORDS: &str = match core::str::from_utf8(&LETTERS) {
     Ok(words) => words,
@@ -117,9 +159,9 @@ const LETTERS: [u8; length()] = letters();
 /// The words of a code.
 pub(super) fn of(code: u16) -> Option<&'static str> {
     let mut start = 0;
-    for (first, last, end) in &ENDS {
-        let end = usize::from(*end);
-        if (*first..=*last).contains(&code) {
+    for entry in &ENTRIES {
+        let end = start + usize::from(entry.letters);
+        if entry.contains(code) {
             return WORDS.get(start..end);
         }
         start = end;
@@ -138,16 +180,15 @@ const fn length() -> usize {
 }
 
 #[expect(clippy::indexing_slicing, reason = "evaluated by the compiler only")]
-const fn ends() -> [(u16, u16, u16); TEXTS.len()] {
-    let mut ends = [(0, 0, 0); TEXTS.len()];
-    let (mut n, mut end) = (0, 0);
+const fn entries() -> [Entry; TEXTS.len()] {
+    let mut entries = [const { Entry::NONE }; TEXTS.len()];
+    let mut n = 0;
     while n < TEXTS.len() {
         let (first, last, text) = TEXTS[n];
-        end += text.len();
-        ends[n] = (first, last, end as u16);
+        entries[n] = Entry::new(first, last, text);
         n += 1;
     }
-    ends
+    entries
 }
 
 #[expect(clippy::indexing_slicing, reason = "evaluated by the compiler only")]
@@ -173,11 +214,16 @@ mod tests {
 
     #[test]
     fn every_entry_keeps_its_words() {
-        for (n, (first, last, text)) in TEXTS.iter().enumerate() {
-            assert!(first <= last);
-            let end = usize::from(ENDS[n].2);
-            assert_eq!(&WORDS[end - text.len()..end], *text);
+        let mut start = 0;
+        for ((first, last, text), entry) in TEXTS.iter().zip(&ENTRIES) {
+            assert!(entry.contains(*first) && entry.contains(*last));
+            assert!(*first == 0 || !entry.contains(first - 1));
+            assert!(*last == u16::MAX || !entry.contains(last + 1));
+            let end = start + usize::from(entry.letters);
+            assert_eq!(&WORDS[start..end], *text);
+            start = end;
         }
+        assert_eq!(start, WORDS.len());
     }
 
     #[test]

@@ -188,7 +188,7 @@ impl Receiver {
     /// 05040003h if nothing but such segments comes.
     pub(super) fn segment(
         &mut self,
-        segment: BlockSegment,
+        segment: &BlockSegment,
     ) -> Result<Option<[u8; SEGMENT_MAX]>, AbortCode> {
         self.stalled = false;
         self.over = segment.last || segment.sequence >= self.block_size;

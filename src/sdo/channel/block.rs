@@ -68,7 +68,7 @@ impl Channel {
         payload: &mut dyn Payload,
     ) -> Result<Step, Failure> {
         let segment = BlockSegment::decode(command.0).ok_or(AbortCode::SEQUENCE_NUMBER)?;
-        if let Some(before) = self.receiver.segment(segment)? {
+        if let Some(before) = self.receiver.segment(&segment)? {
             self.take(&before, false, payload)?;
         }
         Ok(match self.receiver.over() {

@@ -48,7 +48,7 @@ impl Server {
                 None => Ok(()),
             };
         };
-        let before = self.receiver.segment(segment)?;
+        let before = self.receiver.segment(&segment)?;
         if let (Some(data), None) = (before, self.refused) {
             self.refused = self.transfer.push(od, &data, false).err();
         }
