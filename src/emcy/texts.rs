@@ -126,7 +126,7 @@ impl Entry {
     };
 
     /// # Panics
-    /// While it is compiled, if there is no such span, or too many letters.
+    /// While it is compiled, if there are too many letters or no such span.
     const fn new(first: u16, last: u16, text: &str) -> Entry {
         assert!(text.len() <= u8::MAX as usize, "the words are too long");
         let mut spans: &[u16] = &SPANS;
@@ -138,9 +138,10 @@ impl Entry {
                     letters: text.len() as u8,
                 };
             }
+            assert!(!others.is_empty(), "a span that is not in the list");
             spans = others;
         }
-        panic!("a span that is not in the list")
+        Entry::NONE
     }
 
     fn contains(&self, code: u16) -> bool {

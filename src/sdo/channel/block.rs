@@ -82,10 +82,7 @@ impl Channel {
 
     /// At its deadline a block download sends the next segment, and a block
     /// upload acknowledges what it has, once, so that the rest is sent again.
-    pub(super) fn block_poll(
-        &mut self,
-        payload: &mut dyn Payload,
-    ) -> Result<bool, AbortCode> {
+    pub(super) fn block_poll(&mut self, payload: &mut dyn Payload) -> Result<bool, AbortCode> {
         let command = match self.state {
             State::BlockDownloadSegments => match self.sender.next_offset()? {
                 Some(offset) => {

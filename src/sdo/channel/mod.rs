@@ -470,11 +470,7 @@ impl Channel {
     }
 
     /// An upload begins, of as many bytes as the server tells.
-    fn announced(
-        &mut self,
-        size: Option<u32>,
-        payload: &mut dyn Payload,
-    ) -> Result<(), Failure> {
+    fn announced(&mut self, size: Option<u32>, payload: &mut dyn Payload) -> Result<(), Failure> {
         self.size = size;
         payload
             .begin(size)
@@ -527,7 +523,9 @@ impl Channel {
     }
 
     fn frame(&self) -> Frame {
-        Frame::full(CobId::of(FunctionCode::SdoRequest, self.node), self.request.0)
+        Frame::full(
+            CobId::of(FunctionCode::SdoRequest, self.node),
+            self.request.0,
+        )
     }
 }
-

@@ -191,7 +191,9 @@ impl Server {
                 self.transfer.open_upload(od, command.address())?;
                 self.upload(od)?;
             }
-            (Request::BlockDownload, _) if self.block_size > 0 => self.block_download(command, od)?,
+            (Request::BlockDownload, _) if self.block_size > 0 => {
+                self.block_download(command, od)?
+            }
             (Request::BlockUpload, _) if self.block_size > 0 => self.block_upload(command, od)?,
             (Request::DownloadSegment, Phase::Download) => self.download_segment(command, od)?,
             (Request::UploadSegment, Phase::Upload) => self.upload_segment(command, od)?,

@@ -7,7 +7,11 @@ use crate::sdo::command::{Answer, Command, EXPEDITED_MAX, SEGMENT_MAX};
 
 impl Server {
     /// CiA 301, 7.2.4.3.3.
-    pub(super) fn download(&mut self, command: &Command, od: &mut impl ObjectDictionary) -> Outcome {
+    pub(super) fn download(
+        &mut self,
+        command: &Command,
+        od: &mut impl ObjectDictionary,
+    ) -> Outcome {
         let (at, size) = (command.address(), command.size());
         let transfer = &mut self.transfer;
         transfer.open_download(od, at, size)?;
