@@ -10,6 +10,7 @@ use super::settings::{Settings, Startup};
 use crate::frame::Frame;
 use crate::id::{CobId, FunctionCode, NodeId};
 use crate::network::Network;
+use crate::nmt::Command;
 use crate::time::{Duration, Instant};
 use core::mem::MaybeUninit;
 use heapless::{Deque, Vec};
@@ -220,6 +221,18 @@ impl<const N: usize> NetworkBoot<N> {
     /// that is what it takes.
     pub fn node_lost(&mut self, id: NodeId) -> bool {
         self.node_mut(id).is_some_and(|node| node.lose(false))
+    }
+
+    /// The node tells that it has missed the bus or the master (EMCY 8120h, 8130h)
+    /// while nobody expected it to be operational: it is reset and booted again.
+    /// Some drives leave such an error only by that.
+    pub fn node_cut_off(&mut self, id: NodeId, now: Instant) {
+        let boot_time = self.boot_time;
+        if self.phase.listens()
+            && let Some(node) = self.node_mut(id)
+        {
+            node.reset_by_request(Command::ResetCommunication, boot_time, now);
+        }
     }
 
     /// The controller is bus-off. After a pause [`Action::RestartController`]

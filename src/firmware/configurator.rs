@@ -91,8 +91,12 @@ impl<'a> Configurator<'a> {
 
     /// What the other tasks have to say. `true`: the controller is bus-off.
     fn listen(&mut self) -> bool {
+        let now = self.now();
         let local = &mut self.local;
         while let Some(news) = local.news.dequeue() {
+            if let Some(node) = news.cut_off_node() {
+                local.boot.node_cut_off(node, now);
+            }
             // Who is just being booted has to be silent for a while.
             let lost = news.lost_node();
             if lost.is_none_or(|node| local.boot.node_lost(node)) {

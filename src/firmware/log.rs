@@ -6,6 +6,7 @@ use crate::counters::Counts;
 use canmaster::{
     NodeId,
     boot::Event,
+    emcy::EmcyCode,
     master::{Notice, Report},
     motion::{FaultCause, GroupEvent, GroupState},
     network::{Network, Node},
@@ -150,6 +151,19 @@ impl News {
                 notice: Notice::HeartbeatLost(lost),
                 ..
             }) => Some(lost.node),
+            _ => None,
+        }
+    }
+
+    /// A node that has missed the bus or the master while it was being booted. A
+    /// drive leaves that error by a reset of its communication alone.
+    pub(crate) fn cut_off_node(&self) -> Option<NodeId> {
+        match *self {
+            News::Node(Report {
+                notice: Notice::Emcy { node, emcy },
+                fault: None,
+                ..
+            }) if matches!(emcy.code, EmcyCode::ERROR_PASSIVE | EmcyCode::HEARTBEAT) => Some(node),
             _ => None,
         }
     }

@@ -68,6 +68,30 @@ fn a_node_that_fell_silent_is_reset_and_booted_again() {
     assert_eq!(rig.events.last(), Some(&Event::NetworkReady));
 }
 
+/// It boots while its cable is cut, sends in vain, and says so when it is heard.
+#[test]
+fn a_node_that_was_cut_off_while_it_booted_is_reset() {
+    let mut rig = Rig::new(network(3, |_| {}));
+    while rig.requests(2).is_empty() {
+        rig.run_for(ms(1));
+    }
+    rig.forget();
+    rig.boot.node_cut_off(id(2), rig.now);
+    rig.run_for(ms(2000));
+    assert_eq!(rig.nmt(), [[0x82, 2], [0x80, 2], [0x01, 0]]);
+    let boots = rig.events.iter().filter(|e| **e == Event::BootUp(id(2)));
+    assert_eq!(boots.count(), 1);
+    assert!(rig.boot.is_ready());
+}
+
+#[test]
+fn a_master_that_is_silent_resets_nobody() {
+    let mut rig = Rig::new(network(3, |_| {}));
+    rig.boot.node_cut_off(id(2), rig.now);
+    rig.run();
+    assert_eq!(rig.nmt(), [[0; 2]; 0]);
+}
+
 #[test]
 fn a_node_that_leaves_operational_by_itself_is_booted_again() {
     let mut rig = running(network(3, |_| {}));

@@ -349,6 +349,20 @@ fn recovery_leads_to_standby_and_not_to_motion() {
     assert!(rig.until(Standby, 1500) > 0, "{:?}", rig.events);
 }
 
+/// An axis that still turns when it is enabled is braked first: standby holds the
+/// place where it has come to rest.
+#[test]
+fn standby_waits_until_every_axis_stands() {
+    let mut rig = in_state(Idle);
+    rig.drives[AXIS].velocity = 1500.0;
+    assert!(rig.until(Standby, 300) > 0, "{:?}", rig.events);
+    assert!(rig.drives[AXIS].velocity.abs() < 10.0);
+    for _ in 0..200 {
+        rig.step(READY);
+        assert_eq!(rig.group.state(), Standby, "{:?}", rig.events);
+    }
+}
+
 /// Faults of the past are reset on the way up.
 #[test]
 fn enabling_resets_old_faults() {

@@ -47,6 +47,8 @@ pub struct Release {
     pub done: Option<Time>,
     /// It was taken back before that: the stop button, a reset, a fault.
     pub revoked: bool,
+    /// Another tool gave it: where the axes go is not known here.
+    pub ordered: bool,
 }
 
 /// One axis at the end of one move.
@@ -79,7 +81,7 @@ pub fn arrivals(
 ) -> Vec<Arrival> {
     let mut all = Vec::new();
     for (number, release) in (1..).zip(releases) {
-        if release.revoked {
+        if release.revoked || release.ordered {
             continue;
         }
         for (axis, (monitor, &node)) in axes.iter().zip(nodes).enumerate() {
@@ -164,6 +166,7 @@ mod tests {
             homes: vec![100, 100],
             done,
             revoked: false,
+            ordered: false,
         }
     }
 

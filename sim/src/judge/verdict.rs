@@ -165,7 +165,7 @@ fn beside_target(evidence: &Evidence<'_>) -> Option<String> {
 
 fn moves_missing(evidence: &Evidence<'_>) -> Option<String> {
     for (number, release) in (1..).zip(evidence.releases) {
-        if release.done.is_none() || release.revoked {
+        if release.done.is_none() || release.revoked || release.ordered {
             continue;
         }
         for (place, (node, axis)) in evidence.nodes.iter().zip(evidence.axes).enumerate() {
@@ -254,6 +254,7 @@ mod tests {
                 homes: vec![0, 0],
                 done: Some(Time::from_ms(600)),
                 revoked: false,
+                ordered: false,
             }],
             bus: BusFigures::default(),
             irq_off_cycles: IRQ_OFF_LIMIT,

@@ -8,6 +8,7 @@ mod image;
 mod line;
 mod machine;
 mod operator;
+mod orders;
 mod record;
 mod scenario;
 mod station;
@@ -39,6 +40,7 @@ use crate::log::{LogDecoder, LogLine};
 use crate::time::Time;
 use line::{Line, Who};
 use operator::Operator;
+use orders::Orders;
 use record::Seen;
 use station::Station;
 use stimulus::Agenda;
@@ -90,6 +92,7 @@ pub struct World<'i> {
     guest: Option<guest::Guest>,
     agenda: Agenda,
     operator: Operator,
+    orders: Orders,
     watch: Watch,
     decoder: LogDecoder<'i>,
     log: Vec<(Time, LogLine)>,
@@ -156,6 +159,7 @@ impl<'i> World<'i> {
             guest: None,
             agenda,
             operator,
+            orders: Orders::new(machine.network().master.node),
             watch: Watch::new(moves),
             decoder: image.log_table().decoder(),
             log: Vec::new(),

@@ -3,6 +3,7 @@
 
 use super::line::{Line, Who};
 use super::operator::View;
+use super::orders::Order;
 use super::station::Station;
 use super::watch::{AxisTruth, LAST_COMMAND};
 use super::{FIRST, Observer, World, enabled, operational};
@@ -116,6 +117,11 @@ impl World<'_> {
     fn look(&mut self, observer: &mut dyn Observer) {
         self.lines.iter_mut().for_each(Line::read);
         self.read_log(observer);
+        match self.orders.read(&self.lines[FIRST].wire) {
+            Some(Order::Release) => self.watch.release_by_order(self.now),
+            Some(Order::Stop) => self.watch.revoke(self.now + LAST_COMMAND),
+            None => {}
+        }
         for station in drives(&mut self.stations, &mut self.strangers) {
             // Control cycles that nobody waits for have not been worked out yet.
             station.drive.advance(self.now);

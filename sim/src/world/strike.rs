@@ -39,8 +39,6 @@ const FASTER_RPM: f64 = 40.0;
 const COMPARED_RPM: f64 = 100.0;
 /// Axes come to rest together if they reach this part of their speeds together.
 const TOGETHER_PART: f64 = 0.15;
-/// Within so many cycles.
-const TOGETHER_CYCLES: u64 = 2;
 /// The firmware's limit of the following error: a part of a turn.
 const FOLLOWING_PART: f64 = 0.25;
 /// How late a velocity loop and the firmware's position loop may be, as a part of
@@ -312,7 +310,7 @@ impl Strike {
         let cycle = Time::from(world.machine().network().cycle);
         must(
             world,
-            apart.is_none_or(|apart| apart <= cycle * TOGETHER_CYCLES),
+            apart.is_none_or(|apart| apart <= cycle),
             "the axes do not come to rest together",
         )?;
         Ok(Struck {

@@ -133,7 +133,9 @@ impl Watch {
 
     /// All drives are enabled and at rest.
     pub(super) fn ready(&self) -> bool {
-        self.enabled.iter().all(|enabled| *enabled) && self.at_rest() && !self.released
+        let ordered = self.releases.last().is_some_and(|last| last.ordered);
+        let free = !self.released || ordered;
+        self.enabled.iter().all(|enabled| *enabled) && self.at_rest() && free
     }
 
     /// No axis moves.
@@ -153,11 +155,22 @@ impl Watch {
 
     /// The operator lets the machine move.
     pub(super) fn release(&mut self, at: Time) {
+        self.allow(at, false);
+    }
+
+    /// Another tool lets it move, nobody here knows where to, how often or for how
+    /// long: until the next stop.
+    pub(super) fn release_by_order(&mut self, at: Time) {
+        self.allow(at, true);
+    }
+
+    fn allow(&mut self, at: Time, ordered: bool) {
         self.releases.push(Release {
             at,
             homes: self.homes.clone(),
             done: None,
             revoked: false,
+            ordered,
         });
         self.released = true;
         self.revoked_at = None;
@@ -168,7 +181,7 @@ impl Watch {
     /// axis may start any more.
     pub(super) fn revoke(&mut self, at: Time) {
         if let Some(release) = self.releases.last_mut()
-            && release.done.is_none()
+            && (release.done.is_none() || release.ordered)
         {
             release.revoked = true;
             self.revoked_at.get_or_insert(at);
@@ -183,6 +196,16 @@ impl Watch {
         let Some(release) = self.releases.last_mut() else {
             return false;
         };
+        if release.ordered && !release.revoked {
+            let moved = |axis: &AxisMonitor| {
+                let last = axis.movements().last();
+                last.is_some_and(|movement| movement.release == number)
+            };
+            if self.axes.iter().any(moved) {
+                release.done = Some(at);
+            }
+            return false;
+        }
         if release.revoked {
             self.released = self.revoked_at.is_some_and(|since| at < since);
             return false;
@@ -295,6 +318,23 @@ mod tests {
         watch.sample(Time::from_ms(49), &truth(0.0, 100.0));
         watch.sample(Time::from_ms(60), &truth(0.0, 50.0));
         assert_eq!(watch.axes[0].unreleased(), None);
+    }
+
+    #[test]
+    fn an_order_allows_motion_until_the_next_stop() {
+        let mut watch = Watch::new(vec![2]);
+        watch.sample(Time::from_ms(1), &truth(0.0, 0.0));
+        watch.release_by_order(Time::from_ms(2));
+        for start_ms in [10, 1000, 2000] {
+            one_move(&mut watch, start_ms);
+            assert!(watch.ready());
+        }
+        assert_eq!(watch.axes[0].unreleased(), None);
+        assert!(watch.releases[0].done.is_some());
+        watch.revoke(Time::from_ms(2600));
+        watch.sample(Time::from_ms(2700), &truth(0.0, 0.0));
+        one_move(&mut watch, 3000);
+        assert!(watch.axes[0].unreleased().is_some());
     }
 
     #[test]

@@ -389,7 +389,12 @@ impl<const N: usize> Group<N> {
             Goal::Ready => self.set_stage(Goal::SwitchedOn),
             Goal::SwitchedOn => self.set_stage(Goal::Enabled),
             Goal::Enabled | Goal::QuickStop => {
-                if self.axes.iter().all(|a| a.absent || a.feedback.fresh) {
+                // A drive that was switched off in motion may have been enabled
+                // before its axis stood: it brakes first.
+                let limit = self.config.standstill_rpm;
+                let rests =
+                    |a: &Axis| a.feedback.fresh && a.feedback.velocity.unsigned_abs() <= limit;
+                if self.axes.iter().all(|a| a.absent || rests(a)) {
                     self.hold_actual();
                     for axis in &mut self.axes {
                         axis.home = axis.feedback.position;

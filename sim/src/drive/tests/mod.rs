@@ -12,3 +12,4 @@ mod on_bus;
 mod process;
 mod rig;
 mod storing;
+mod trouble;

@@ -204,6 +204,36 @@ fn velocity_units() {
     assert!((9_900..10_100).contains(&seen), "{seen}");
 }
 
+/// Every speed of the dictionary has the unit of 60A9h; accelerations do not
+/// (60AAh).
+#[test]
+fn speeds_of_other_modes_have_the_unit_too() {
+    let hundredths = 0xFEB4_4700_u32;
+    let start = |mode| {
+        let mut rig = Rig::booted(quick(1));
+        rig.write32(0x60A9, 0, hundredths.into());
+        rig.enable_in(mode);
+        rig
+    };
+    let mut position = start(1);
+    position.write32(0x6081, 0, 30_000);
+    position.write32(0x607A, 0, 1_000_000);
+    position.controlword(0x1F);
+    let mut limited = start(3);
+    limited.write32(0x607F, 0, 30_000);
+    limited.target_velocity(100_000);
+    let mut homing = start(6);
+    homing.write(0x6098, 0, &[23]).unwrap();
+    homing.write32(0x6099, 1, 30_000);
+    homing.controlword(0x1F);
+    let mut cyclic = start(9);
+    cyclic.target_velocity(30_000);
+    for mut rig in [position, limited, homing, cyclic] {
+        rig.run_ms(800);
+        assert!((rig.rpm() - 300.0).abs() < 5.0, "{}", rig.rpm());
+    }
+}
+
 #[test]
 fn block_transfer_where_the_drive_is_said_to_have_it() {
     let mut rig = Rig::booted(DriveConfig {

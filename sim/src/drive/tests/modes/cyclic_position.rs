@@ -54,6 +54,30 @@ fn without_interpolation_it_steps() {
     assert!(stepped > 3.0 * smooth, "{stepped} {smooth}");
 }
 
+/// 60C2h says 2 ms, the SYNC comes every 10 ms: the drive misses four of five.
+#[test]
+fn a_period_shorter_than_that_of_the_sync_is_8250() {
+    let c = Cyclic::told(at(0.0), 8, TARGET, 10, 2, 0);
+    assert_eq!(c.rig.sent(0x081), [[0x50, 0x82, 0x10, 0, 0, 0, 0, 0]]);
+}
+
+/// 60C2h says 40 ms, the SYNC comes every 10 ms: each set value is replaced on the
+/// way to it, so that the axis lags behind.
+#[test]
+fn with_a_period_longer_than_that_of_the_sync_the_axis_lags() {
+    let lag = |period| {
+        let mut c = Cyclic::told(at(0.0), 8, TARGET, 10, period, 0);
+        for n in 1..=50 {
+            c.set(n * 200);
+        }
+        assert_eq!(c.rig.state(), State::OperationEnabled);
+        10_000.0 - c.rig.drive().truth().position_inc
+    };
+    let (right, long) = (lag(10), lag(40));
+    assert!(right.abs() < 40.0, "{right}");
+    assert!(long > 500.0, "{long}");
+}
+
 #[test]
 fn a_set_value_that_stays_away_is_8250() {
     let mut c = Cyclic::new(at(0.0), 8, TARGET, 4, 0);

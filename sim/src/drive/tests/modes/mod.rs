@@ -51,6 +51,18 @@ struct Cyclic {
 
 impl Cyclic {
     fn new(config: DriveConfig, mode: u8, entry: u32, period_ms: u64, first: i32) -> Cyclic {
+        Cyclic::told(config, mode, entry, period_ms, period_ms, first)
+    }
+
+    /// The same, told in 60C2h that they come every `told_ms`.
+    fn told(
+        config: DriveConfig,
+        mode: u8,
+        entry: u32,
+        period_ms: u64,
+        told_ms: u64,
+        first: i32,
+    ) -> Cyclic {
         let mut rig = Rig::booted(config);
         rig.write32(0x1400, 1, 0x8000_0201);
         rig.write(0x1600, 0, &[0]).unwrap();
@@ -59,7 +71,7 @@ impl Cyclic {
         rig.write(0x1600, 0, &[2]).unwrap();
         rig.write(0x1400, 2, &[1]).unwrap();
         rig.write32(0x1400, 1, 0x201);
-        rig.write(0x60C2, 1, &[period_ms as u8]).unwrap();
+        rig.write(0x60C2, 1, &[told_ms as u8]).unwrap();
         rig.write(0x6060, 0, &[mode]).unwrap();
         rig.nmt(0x01);
         let mut cyclic = Cyclic {
