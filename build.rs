@@ -3,6 +3,7 @@
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rustc-check-cfg=cfg(fdcan1, fdcan2, fdcan3)");
     #[cfg(feature = "firmware")]
     if std::env::var("CARGO_CFG_TARGET_OS").as_deref() == Ok("none") {
         firmware::prepare();
@@ -58,6 +59,10 @@ mod firmware {
             // Cargo ends the build because of the errors.
             return;
         };
+        for bus in &machine.buses {
+            // The controllers whose tasks are there.
+            println!("cargo::rustc-cfg=fdcan{}", bus.peripheral);
+        }
         let text = derive::rust(&machine, "canmaster");
         fs::write(out.join("network.rs"), text).expect("OUT_DIR can be written to");
     }

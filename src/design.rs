@@ -18,11 +18,11 @@ pub const WATCHDOG_MS: u32 = 100;
 /// Contacts of this kind bounce for up to 5 ms.
 pub const BUTTON_SAMPLES: u8 = 20;
 
-/// Frames that may wait for a transmit buffer. At worst the two RPDOs of each axis
-/// in a cycle in which all ramps change, an SDO request or an abort for each
-/// node, an NMT command for each, and a heartbeat, besides [`OWN_FRAMES`].
+/// Frames besides the RPDOs of every cycle that may wait for a transmit buffer. At
+/// worst the ramps of each axis, an SDO request or an abort for each node, an NMT
+/// command for each, and a heartbeat, besides [`OWN_FRAMES`].
 pub const fn tx_queue(axes: usize) -> usize {
-    4 * axes + OWN_FRAMES + 2
+    3 * axes + OWN_FRAMES + 2
 }
 
 /// While so many frames wait for a transmit buffer, the board's own SDO server
@@ -50,6 +50,10 @@ pub const fn log_queue(axes: usize) -> usize {
     4 * (axes + 2)
 }
 
+/// How often overdue heartbeats and guarding answers are looked for, in
+/// milliseconds: far below any time that is waited for one.
+pub const SUPERVISION_MS: u32 = 4;
+
 /// How often the LEDs are switched, in milliseconds: far below their shortest
 /// phase of 50 ms.
 pub const LED_MS: u32 = 10;
@@ -59,5 +63,5 @@ pub const LED_MS: u32 = 10;
 pub const COUNTS_MS: u32 = 1000;
 
 /// After how long the configurator runs at the latest, so that it shows up in
-/// the watchdog's roll call several times in its period.
-pub const CONFIGURATOR_PERIOD: Duration = Duration::from_millis(20);
+/// the watchdog's roll call twice in its period.
+pub const CONFIGURATOR_PERIOD: Duration = Duration::from_millis(40);

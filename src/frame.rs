@@ -31,6 +31,17 @@ impl Frame {
         })
     }
 
+    /// A data frame of the first `len` bytes, at most eight, of `data`; the others
+    /// have to be zero.
+    pub(crate) const fn of_padded(id: CobId, len: u8, data: [u8; MAX_DATA]) -> Frame {
+        Frame {
+            id,
+            len,
+            remote: false,
+            data,
+        }
+    }
+
     /// A data frame of eight bytes, as every SDO and LSS frame is.
     pub const fn full(id: CobId, data: [u8; MAX_DATA]) -> Frame {
         Frame {

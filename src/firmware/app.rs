@@ -3,7 +3,7 @@
 //! | priority | task | runs |
 //! |---|---|---|
 //! | 5 | `sync_tick` | TIM2 update, every cycle |
-//! | 4 | `can_irq` | FDCAN1 line 0, and pended when there is something to send |
+//! | 4 | `can_irq` | FDCAN line 0, and pended when there is something to send; one for each controller |
 //! | 3 | `pdo_producer` | pended by the last TPDO, or TIM3 compare at the deadline |
 //! | 2 | `network` | TIM7, every millisecond |
 //! | 1 | `sdo_configurator` | woken by `can_irq` and `network` |
@@ -11,9 +11,9 @@
 //!
 //! | resource | ceiling | held for |
 //! |---|---|---|
-//! | `od` | 5 | one entry copied |
-//! | `can_tx` | 5 | one buffer filled and requested |
-//! | `tx_queue` | 4 | one frame put in or taken out |
+//! | `sender` | 5 | one buffer filled and requested |
+//! | `od` | 4 | one entry copied |
+//! | `lines` | 4 | one frame put in or taken out |
 //! | `control` | 3 | one copy |
 //!
 //! Budgets are cycles at 170 MHz for six axes.
@@ -25,33 +25,32 @@ mod app {
         configurator::Configurator,
         control::Control,
         counters::{self, Counts},
-        derived::{self, AXES},
-        filters::{self, Handler},
-        leds,
+        derived::{self, AXES, BUSES},
+        filters, leds,
+        lines::{self, Line, Lines, PRODUCING, SYNCS, Sender},
         log::{News, UPTIME_MS},
         own_node::{Order, OwnNode, Storage},
+        reception::{Receiver, States, queue},
         report::{publish, tell},
         roll::{self, Task},
-        transfer, wake,
+        wake,
     };
     use canmaster::{
         Frame,
         boot::NetworkBoot,
         design,
         id::{CobId, FunctionCode},
-        master::{
-            AxisMap, Debounce, ExtendedClock, MasterOd, Put, Reception, Supervisor, TpdoSlot,
-            TxQueue,
-        },
+        master::{AxisMap, Debounce, ExtendedClock, MasterOd, Supervisor},
         motion::{AxisCommand, Group, GroupEvent},
         network::Network,
         nmt,
+        sync::SyncCounter,
         time::{Duration, Instant},
     };
     use core::{mem::MaybeUninit, sync::atomic::Ordering};
     use heapless::spsc::{Consumer, Producer, Queue};
     use nucleo_g474re::{
-        Config, can, pac::Interrupt, pins, reset_cause::ResetCause, timers, watchdog::Watchdog,
+        Config, can, pins, reset_cause::ResetCause, timers, watchdog::Watchdog,
     };
 
     type FrameQueue = Queue<Frame, { design::rx_queue(AXES) }>;
@@ -65,23 +64,18 @@ mod app {
     #[shared]
     struct Shared {
         od: MasterOd<AXES>,
-        can_tx: can::Tx,
-        tx_queue: TxQueue<{ design::tx_queue(AXES) }>,
+        sender: Sender,
+        lines: Lines,
         control: Control,
-        bus: can::ErrorState,
+        states: States,
+        #[lock_free]
+        receiver: Receiver,
         commands: [AxisCommand; AXES],
     }
 
     #[local]
     struct Local {
         period: timers::Period,
-        sync: can::Element,
-        can_rx: can::Rx,
-        axis_map: AxisMap,
-        to_network: Producer<'static, Frame>,
-        answers_to: Producer<'static, Frame>,
-        transfer_to: Producer<'static, Frame>,
-        requests_to: Producer<'static, Frame>,
         deadline: timers::Deadline,
         axes: &'static mut Axes,
         events_to: Producer<'static, GroupEvent>,
@@ -135,14 +129,17 @@ mod app {
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
         let cycle_us = defmt::unwrap!(u16::try_from(NETWORK.cycle.as_micros()).ok());
-        let board = nucleo_g474re::setup(
+        let settings = |peripheral| can::Settings {
+            timing: derived::bit_timing(peripheral),
+            filters: &filters::FILTERS,
+        };
+        let board = nucleo_g474re::setup::<{ derived::CAN }>(
             cx.device,
             &Config {
                 period_us: cycle_us,
                 deadline_us: derived::TPDO_DEADLINE_US,
                 watchdog_ms: design::WATCHDOG_MS,
-                bit_timing: derived::BIT_TIMING,
-                filters: &filters::FILTERS,
+                can: [settings(1), settings(2), settings(3)],
             },
         );
 
@@ -154,7 +151,6 @@ mod app {
         let (events_to, events) = cx.local.event_queue.split();
         let (requests_to, requests) = cx.local.request_queue.split();
         let (orders_to, orders) = cx.local.order_queue.split();
-        let sync = defmt::unwrap!(can::Element::new(&Frame::empty(CobId::SYNC)));
         defmt::unwrap!(sdo_configurator::spawn().ok());
         let own = new_own_node(cx.local.own_place);
         let store = own.load(board.storage);
@@ -162,21 +158,27 @@ mod app {
         (
             Shared {
                 od: MasterOd::new(&derived::TPDO_BYTES),
-                can_tx: board.can_tx,
-                tx_queue: TxQueue::new(),
+                sender: Sender {
+                    tx: board.can_tx,
+                    sync: lines::element(&Frame::empty(CobId::SYNC)).with_event(),
+                    counter: SyncCounter::NONE,
+                },
+                lines: [const { Line::new() }; BUSES],
                 control: Control::new(),
-                bus: can::ErrorState::Active,
+                states: [can::ErrorState::Active; BUSES],
+                receiver: Receiver {
+                    rx: board.can_rx,
+                    phase: board.phase,
+                    axis_map: AxisMap::new(NETWORK),
+                    to_network,
+                    answers_to,
+                    transfer_to,
+                    requests_to,
+                },
                 commands: [AxisCommand::default(); AXES],
             },
             Local {
                 period: board.period,
-                sync,
-                can_rx: board.can_rx,
-                axis_map: AxisMap::new(NETWORK),
-                to_network,
-                answers_to,
-                transfer_to,
-                requests_to,
                 deadline: board.deadline,
                 axes: new_axes(cx.local.group_place, cx.local.axes_place),
                 events_to,
@@ -247,26 +249,22 @@ mod app {
         }
     }
 
-    /// Requests the SYNC and opens the cycle.
+    /// Requests the SYNC of every bus and opens the cycle.
     ///
     /// Trigger: TIM2 update, to the clock tick. Budget: 170 cycles from the
-    /// timer's event to the transmit request. If it is late, the SYNC is, by as
-    /// much: jitter. If the last SYNC still waits for the bus, none is sent and
-    /// that is counted.
-    #[task(binds = TIM2, priority = 5, local = [period, sync], shared = [od, can_tx])]
-    fn sync_tick(cx: sync_tick::Context) {
-        let sync = cx.local.sync;
-        (cx.shared.od, cx.shared.can_tx).lock(|od, can_tx| {
-            if !od.sync_producer() {
-                return;
-            }
-            sync.set_byte(od.count_sync());
-            if can_tx.holds(CobId::SYNC.into()) || can_tx.transmit(sync).is_err() {
-                counters::SYNC_NOT_SENT.count();
-            }
-            od.open_cycle();
-        });
+    /// timer's event to the transmit request, 260 to the last of three. If it is
+    /// late, the SYNC is, by as much: jitter. If the last SYNC still waits for the
+    /// bus, none is sent and that is counted.
+    #[task(binds = TIM2, priority = 5, local = [period], shared = [sender])]
+    fn sync_tick(mut cx: sync_tick::Context) {
+        if PRODUCING.load(Ordering::Relaxed) {
+            cx.shared.sender.lock(Sender::sync);
+            let syncs = SYNCS.load(Ordering::Relaxed).wrapping_add(1);
+            SYNCS.store(syncs, Ordering::Relaxed);
+        }
         cx.local.period.acknowledge();
+        // What may go after the SYNC.
+        lines::send_now();
         roll::check_in(Task::SyncTick);
     }
 
@@ -277,108 +275,48 @@ mod app {
     /// cycles for three frames each way. If it takes longer than three frames on
     /// the bus (141 us, 24 000 cycles), a FIFO overruns: frames are lost, which
     /// is counted; a lost TPDO is missing in its cycle.
-    #[task(
-        binds = FDCAN1_IT0,
-        priority = 4,
-        local = [can_rx, axis_map, to_network, answers_to, transfer_to, requests_to],
-        shared = [od, can_tx, tx_queue, bus]
-    )]
+    #[cfg(fdcan1)]
+    #[task(binds = FDCAN1_IT0, priority = 4, shared = [od, sender, lines, states, receiver])]
     fn can_irq(mut cx: can_irq::Context) {
-        let can_irq::LocalResources {
-            can_rx,
-            axis_map,
-            to_network,
-            answers_to,
-            transfer_to,
-            requests_to,
-            ..
-        } = cx.local;
-        let flags = can_rx.take_flags();
-        if flags.message_lost() {
-            counters::RX_OVERRUNS.count();
-        }
-        if flags.error_state_changed() {
-            let state = can_rx.error_state();
-            cx.shared.bus.lock(|bus| *bus = state);
-            if state == can::ErrorState::BusOff {
-                // Nothing that waits now may be sent when the bus is back, and
-                // SYNC has to wait until the nodes are booted again.
-                cx.shared.od.lock(|od| od.set_sync_producer(false));
-                cx.shared.tx_queue.lock(TxQueue::clear);
-                cx.shared.can_tx.lock(can::Tx::cancel_all);
-            }
-        }
-
-        // First of all, so that the bus is not idle for longer than it must.
-        loop {
-            let pending = cx.shared.can_tx.lock(|can_tx| can_tx.pending());
-            let Some(frame) = cx.shared.tx_queue.lock(|queue| queue.next(&pending)) else {
-                break;
-            };
-            // The frame is made ready before the SYNC is held off.
-            let Some(element) = can::Element::new(&frame) else {
-                continue;
-            };
-            // Two other frames at most were pending, and a SYNC: there is room.
-            if cx
-                .shared
-                .can_tx
-                .lock(|can_tx| can_tx.transmit(&element))
-                .is_err()
-            {
-                counters::RPDO_REPLACED.count();
-            }
-        }
-
-        let mut answered = false;
-        while let Some(element) = can_rx
-            .receive(can::Fifo::Fifo0)
-            .or_else(|| can_rx.receive(can::Fifo::Fifo1))
-        {
-            let Some(handler) = filters::HANDLERS.get(usize::from(element.filter())) else {
-                continue;
-            };
-            if let Handler::Tpdo(number) = handler {
-                let axis = element
-                    .identifier()
-                    .and_then(|id| axis_map.axis(id.as_raw()));
-                let slot = axis.and_then(|axis| TpdoSlot::new(axis, *number));
-                let (Some(slot), false) = (slot, element.is_remote()) else {
-                    continue;
-                };
-                let (data, length) = (element.bytes(), element.len());
-                match cx.shared.od.lock(|od| od.store(slot, data, length)) {
-                    Reception::Stored => {}
-                    Reception::Last => rtic::pend(Interrupt::TIM3),
-                    Reception::TooShort => counters::TPDO_LENGTH.count(),
-                }
-                continue;
-            }
-            let Some(frame) = element.frame::<Frame>() else {
-                continue;
-            };
-            let to = match handler {
-                Handler::Answer if transfer::wants(frame.id()) => &mut *transfer_to,
-                Handler::Answer => &mut *answers_to,
-                Handler::Request => &mut *requests_to,
-                _ => &mut *to_network,
-            };
-            answered |= matches!(handler, Handler::Answer | Handler::Request);
-            queue(to, Some(frame));
-        }
-        if answered {
-            wake::now();
-        }
+        let shared = &mut cx.shared;
+        shared.receiver.serve(
+            const { derived::bus_of(1) },
+            &mut shared.od,
+            &mut shared.sender,
+            &mut shared.lines,
+            &mut shared.states,
+        );
         roll::check_in(Task::CanIrq);
     }
 
-    /// Hands a frame on; a full queue is counted.
-    fn queue(to: &mut Producer<'static, Frame>, frame: Option<Frame>) {
-        if let Some(frame) = frame
-            && to.enqueue(frame).is_err()
-        {
-            counters::RX_QUEUE_FULL.count();
-        }
+    /// The same for FDCAN2.
+    #[cfg(fdcan2)]
+    #[task(binds = FDCAN2_IT0, priority = 4, shared = [od, sender, lines, states, receiver])]
+    fn can_irq_2(mut cx: can_irq_2::Context) {
+        let shared = &mut cx.shared;
+        shared.receiver.serve(
+            const { derived::bus_of(2) },
+            &mut shared.od,
+            &mut shared.sender,
+            &mut shared.lines,
+            &mut shared.states,
+        );
+        roll::check_in(Task::CanIrq);
+    }
+
+    /// The same for FDCAN3.
+    #[cfg(fdcan3)]
+    #[task(binds = FDCAN3_IT0, priority = 4, shared = [od, sender, lines, states, receiver])]
+    fn can_irq_3(mut cx: can_irq_3::Context) {
+        let shared = &mut cx.shared;
+        shared.receiver.serve(
+            const { derived::bus_of(3) },
+            &mut shared.od,
+            &mut shared.sender,
+            &mut shared.lines,
+            &mut shared.states,
+        );
+        roll::check_in(Task::CanIrq);
     }
 
     /// Takes in the TPDOs of this SYNC, steps the axes, and writes the RPDOs that
@@ -392,7 +330,7 @@ mod app {
         binds = TIM3,
         priority = 3,
         local = [deadline, axes, events_to],
-        shared = [od, tx_queue, control, commands]
+        shared = [od, lines, control, commands]
     )]
     fn pdo_producer(mut cx: pdo_producer::Context) {
         let deadline = cx.local.deadline.take();
@@ -400,12 +338,17 @@ mod app {
             // Once per period, whatever else pends the task.
             roll::check_in(Task::PdoProducer);
         }
-        let Some(cycle) = cx.shared.od.lock(|od| od.take_cycle(deadline)) else {
+        let syncs = SYNCS.load(Ordering::Relaxed);
+        let producing = PRODUCING.load(Ordering::Relaxed);
+        let Some(cycle) = cx.shared.od.lock(|od| {
+            od.follow(syncs);
+            od.take_cycle(producing, deadline)
+        }) else {
             return;
         };
         let control = cx.shared.control.lock(Control::take);
         let axes = cx.local.axes;
-        axes.read(&cycle, |slot| cx.shared.od.lock(|od| od.tpdo(slot)));
+        axes.read(&cycle, &mut cx.shared.od);
         axes.step(&control);
         let enabled = axes.enabled(&control);
         (&mut cx.shared.control, &mut cx.shared.commands).lock(|control, commands| {
@@ -414,24 +357,23 @@ mod app {
         });
         if cx.local.deadline.elapsed_us() > control.latest_us {
             // What comes after the window of the SYNC is not sent any more.
-            counters::RPDO_REPLACED.count();
+            counters::RPDO_REPLACED.add(1);
         } else if control.leads() && !control.bus_off {
-            axes.write(
-                |frame| match cx.shared.tx_queue.lock(|queue| queue.put_latest(frame)) {
-                    Ok(Put::Queued) => {}
-                    Ok(Put::Replaced) => counters::RPDO_REPLACED.count(),
-                    // The queue counts it.
-                    Err(_) => {}
-                },
-            );
-            rtic::pend(Interrupt::FDCAN1_IT0);
+            axes.write(&cycle, &mut cx.shared.lines);
+            lines::send_now();
         }
         while let Some(event) = axes.take_event() {
             if cx.local.events_to.enqueue(event).is_err() {
-                counters::LOG_FULL.count();
+                counters::LOG_FULL.add(1);
             }
             wake::want();
         }
+    }
+
+    /// The worst of the controllers' states.
+    fn worst(states: &States) -> can::ErrorState {
+        let all = states.iter().copied();
+        all.max().unwrap_or(can::ErrorState::Active)
     }
 
     /// Error control both ways, emergencies, button, LEDs, and the watchdog.
@@ -447,7 +389,7 @@ mod app {
             from_can, states_to, news_to, supervisor, heartbeat, heartbeat_time,
             orders, counts, known_bus,
         ],
-        shared = [od, tx_queue, control, bus]
+        shared = [od, lines, control, states]
     )]
     fn network(mut cx: network::Context) {
         let local = cx.local;
@@ -460,17 +402,19 @@ mod app {
 
         while let Some(frame) = local.from_can.dequeue() {
             if let Some((FunctionCode::ErrorControl, _)) = frame.id().split() {
-                queue(local.states_to, Some(frame));
+                queue(local.states_to, frame);
                 wake::want();
             }
             if let Some(report) = local.supervisor.on_frame(&frame, now) {
                 tell(report, local.news_to, &mut cx.shared.control);
             }
         }
-        while let Some(report) = local.supervisor.poll(now) {
-            tell(report, local.news_to, &mut cx.shared.control);
+        if local.milliseconds.is_multiple_of(design::SUPERVISION_MS) {
+            while let Some(report) = local.supervisor.poll(now) {
+                tell(report, local.news_to, &mut cx.shared.control);
+            }
         }
-        let bus = cx.shared.bus.lock(|bus| *bus);
+        let bus = cx.shared.states.lock(|states| worst(states));
         let pressed = local.debounce.press(local.button.is_pressed());
         let control = cx.shared.control.lock(|control| {
             control.pressed |= pressed;
@@ -500,8 +444,7 @@ mod app {
             && control.speaking
             && !control.bus_off
         {
-            // A full queue counts it.
-            let _ = cx.shared.tx_queue.lock(|queue| queue.put(frame));
+            lines::send(&mut cx.shared.lines, frame, usize::MAX);
         }
         if local.milliseconds.is_multiple_of(design::LED_MS) {
             let lost = local.supervisor.any_lost();
@@ -513,15 +456,16 @@ mod app {
                 .shared
                 .od
                 .lock(|od| (od.overruns(), od.take_wrong_length()));
-            let overflows = cx.shared.tx_queue.lock(|queue| queue.overflows());
+            let overflows = cx
+                .shared
+                .lines
+                .lock(|lines| lines.iter().map(|line| line.planned.overflows()).sum());
             let counts = Counts::now(overruns, wrong_length, overflows);
             if counts != *local.counts {
                 *local.counts = counts;
                 publish(local.news_to, News::Counts(counts));
             }
         }
-        // Sends the heartbeat, and shows that it is alive.
-        rtic::pend(Interrupt::FDCAN1_IT0);
         wake::if_due(counter);
         roll::check_in(Task::Network);
         if roll::complete() {
@@ -542,7 +486,7 @@ mod app {
             reset_cause, clock, boot, answers, transfer_answers, states, news, events, own, requests, orders_to,
             sync_period, store,
         ],
-        shared = [od, can_tx, tx_queue, control, commands]
+        shared = [od, sender, lines, control, commands]
     )]
     async fn sdo_configurator(cx: sdo_configurator::Context) {
         let mut wake = wake::reader();

@@ -2,14 +2,26 @@
 
 use crate::{
     control::Control,
-    derived::{AXES, PDOS},
+    derived::{AXES, AXIS_BUSES, GROUP, PDOS, RAMPS_ON_CHANGE, RPDOS_AFTER_SYNC},
+    lines::Lines,
 };
 use canmaster::{
-    Frame,
     cia402::StatusWord,
-    master::{Cycle, Ramps, TPDOS_PER_AXIS, TpdoSlot},
-    motion::{AxisCommand, AxisFeedback, Group, GroupEvent, GroupState, Request},
+    master::{Cycle, MasterOd, Ramps, TPDOS_PER_AXIS, TpdoSlot},
+    motion::{AxisCommand, AxisFeedback, Group, GroupEvent, GroupState, Request, Speedometer},
     network::Network,
+};
+use rtic::Mutex;
+
+/// For the axes whose TPDOs carry no velocity.
+const SPEEDOMETERS: [Speedometer; AXES] = {
+    let mut all = [Speedometer::new(1, GROUP.cycle); AXES];
+    let mut n = 0;
+    while n < AXES {
+        all[n] = Speedometer::new(GROUP.axes[n].increments_per_turn, GROUP.cycle);
+        n += 1;
+    }
+    all
 };
 
 /// The group with what surrounds it.
@@ -19,6 +31,7 @@ pub(crate) struct Axes {
     feedback: [AxisFeedback; AXES],
     commands: [AxisCommand; AXES],
     ramps: Ramps<AXES>,
+    speed: [Speedometer; AXES],
 }
 
 impl Axes {
@@ -29,18 +42,27 @@ impl Axes {
             feedback: [AxisFeedback::default(); AXES],
             commands: [AxisCommand::default(); AXES],
             ramps: Ramps::new(),
+            speed: SPEEDOMETERS,
         }
     }
 
-    /// Takes in the TPDOs of a cycle, each through `tpdo`.
-    pub(crate) fn read(&mut self, cycle: &Cycle, mut tpdo: impl FnMut(TpdoSlot) -> [u8; 8]) {
-        for (axis, (feedback, pdos)) in self.feedback.iter_mut().zip(&PDOS).enumerate() {
+    /// Takes in the TPDOs of a cycle.
+    pub(crate) fn read(
+        &mut self,
+        cycle: &Cycle,
+        od: &mut impl Mutex<T = MasterOd<AXES>>,
+    ) {
+        let axes = self.feedback.iter_mut().zip(&mut self.speed);
+        for (axis, ((feedback, speed), pdos)) in axes.zip(&PDOS).enumerate() {
             let (Some(first), Some(second)) = (TpdoSlot::new(axis, 0), TpdoSlot::new(axis, 1))
             else {
                 continue;
             };
             let fresh = !cycle.missing.contains(first) && !cycle.missing.contains(second);
-            *feedback = pdos.feedback(&[tpdo(first), tpdo(second)], fresh);
+            *feedback = od.lock(|od| pdos.feedback(od.image(axis), fresh));
+            if fresh && !pdos.has_velocity() {
+                feedback.velocity = speed.at(feedback.position);
+            }
         }
     }
 
@@ -82,15 +104,36 @@ impl Axes {
         self.group.take_event()
     }
 
-    /// Hands the RPDOs of the next cycle to `send`.
-    pub(crate) fn write(&mut self, mut send: impl FnMut(Frame)) {
+    /// Writes the RPDOs of the next cycle.
+    pub(crate) fn write(&mut self, cycle: &Cycle, lines: &mut impl Mutex<T = Lines>) {
+        lines.lock(|lines| {
+            for line in lines {
+                line.begin(cycle.sync);
+            }
+        });
         let due = self.ramps.due(&self.commands);
         let nodes = self.network.nodes.iter().zip(&PDOS);
-        for (((node, pdos), command), ramps) in nodes.zip(&self.commands).zip(due) {
+        for (axis, ((node, pdos), command)) in nodes.zip(&self.commands).enumerate() {
+            let image = pdos.image(command);
             for number in 0..TPDOS_PER_AXIS as u8 {
-                if !pdos.has_only_ramps(number) || ramps {
-                    pdos.rpdo(number, node.id, command).map(&mut send);
+                let ramps = pdos.has_only_ramps(number);
+                let on_change = ramps && RAMPS_ON_CHANGE.get(axis).is_some_and(|on| *on);
+                if on_change && due != Some(axis) {
+                    continue;
                 }
+                let Some(frame) = pdos.rpdo(number, node.id, &image) else {
+                    continue;
+                };
+                lines.lock(|lines| {
+                    let bus = AXIS_BUSES.get(axis).map(|bus| usize::from(*bus));
+                    if let Some(line) = bus.and_then(|bus| lines.get_mut(bus)) {
+                        if on_change {
+                            line.on_change(frame);
+                        } else {
+                            line.cyclic(frame, ramps || RPDOS_AFTER_SYNC);
+                        }
+                    }
+                });
             }
         }
     }

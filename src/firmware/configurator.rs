@@ -68,7 +68,7 @@ impl<'a> Configurator<'a> {
             &mut self.transfer,
             self.local.own.device.transfer(),
             self.local.transfer_answers,
-            &mut self.shared.tx_queue,
+            &mut self.shared.lines,
             now,
         );
         while self.serve() {

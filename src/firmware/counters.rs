@@ -12,10 +12,10 @@ impl Counter {
         Counter(AtomicU32::new(0))
     }
 
-    /// Counts one.
+    /// Counts `more`.
     #[inline]
-    pub(crate) fn count(&self) {
-        self.0.fetch_add(1, Ordering::Relaxed);
+    pub(crate) fn add(&self, more: u32) {
+        self.0.fetch_add(more, Ordering::Relaxed);
     }
 
     fn get(&self) -> u32 {

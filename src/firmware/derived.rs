@@ -7,7 +7,7 @@ use canmaster::{
     motion::{GroupConfig, Step, experiment},
     sync::SyncLimits,
 };
-use nucleo_g474re::can::BitTiming;
+use nucleo_g474re::can::{BitTiming, Controller};
 
 #[allow(unreachable_pub, reason = "made for any crate")]
 mod generated {
@@ -16,14 +16,86 @@ mod generated {
 
 pub(crate) use generated::{AXES, NETWORK, RPDOS_US, TPDO_DEADLINE_US};
 
-/// The bit timing of the controller.
-pub(crate) const BIT_TIMING: BitTiming = {
-    let (prescaler, seg1, seg2) = generated::BIT_TIMING;
+pub(crate) const BUSES: usize = 1;
+pub(crate) const BUS_PERIPHERALS: [u8; BUSES] = [1];
+pub(crate) const AXIS_BUSES: [u8; AXES] = [0; AXES];
+const BUS_BIT_TIMINGS: [(u16, u16, u16); BUSES] = [generated::BIT_TIMING];
+pub(crate) const RPDOS_AFTER_SYNC: bool = false;
+pub(crate) const RAMPS_ON_CHANGE: [bool; AXES] = [true; AXES];
+pub(crate) const ONE_PLANNED: [bool; BUSES] = [NETWORK.cycle.as_micros() < 5000];
+pub(crate) const AFTER_SYNC_US: [u16; BUSES] = [50];
+const SDO_FROM_US: [u16; BUSES] = [0];
+const SDO_UNTIL_US: [u16; BUSES] = [50];
+const GENERATED_GUARD_US: u16 = 35;
+
+/// Before the end of the cycle nothing is begun that could still be on the wire.
+pub(crate) const GUARD_US: u32 = GENERATED_GUARD_US as u32;
+
+/// The longest frame.
+pub(crate) const FRAME_US: u32 = 135_000_000 / NETWORK.bit_rate;
+
+/// Whether any RPDO of every cycle waits for the next SYNC.
+pub(crate) const EARLY: bool = {
+    let (mut early, mut axis) = (RPDOS_AFTER_SYNC, 0);
+    while axis < AXES {
+        early |= !RAMPS_ON_CHANGE[axis];
+        axis += 1;
+    }
+    early
+};
+
+/// When SDO requests may be sent on each bus: from, and before, in microseconds
+/// after SYNC.
+pub(crate) const SDO_US: [(u16, u16); BUSES] = {
+    let (mut all, mut bus) = ([(0, 0); BUSES], 0);
+    while bus < BUSES {
+        all[bus] = (SDO_FROM_US[bus], SDO_UNTIL_US[bus]);
+        bus += 1;
+    }
+    all
+};
+
+/// The controller of each bus.
+pub(crate) const CONTROLLERS: [Controller; BUSES] = {
+    let (mut all, mut bus) = ([Controller::FDCAN1; BUSES], 0);
+    while bus < BUSES {
+        all[bus] = match Controller::fdcan(BUS_PERIPHERALS[bus]) {
+            Some(controller) => controller,
+            None => panic!("the chip has no such controller"),
+        };
+        bus += 1;
+    }
+    all
+};
+
+/// The bus of a controller, counted from 0.
+pub(crate) const fn bus_of(peripheral: u8) -> usize {
+    let mut bus = 0;
+    while bus < BUSES && BUS_PERIPHERALS[bus] != peripheral {
+        bus += 1;
+    }
+    bus
+}
+
+/// The controllers that are used, FDCAN1 being bit 0.
+pub(crate) const CAN: u8 = {
+    let (mut bits, mut bus) = (0, 0);
+    while bus < BUSES {
+        bits |= 1 << (BUS_PERIPHERALS[bus] - 1);
+        bus += 1;
+    }
+    bits
+};
+
+/// The bit timing of a controller; of the first bus if it has none.
+pub(crate) const fn bit_timing(peripheral: u8) -> BitTiming {
+    let bus = bus_of(peripheral);
+    let (prescaler, seg1, seg2) = BUS_BIT_TIMINGS[if bus < BUSES { bus } else { 0 }];
     match BitTiming::new(prescaler, seg1, seg2) {
         Some(timing) => timing,
         None => panic!("the controller has no such bit timing"),
     }
-};
+}
 
 /// What a description may ask for and the firmware does not do is refused here.
 const _: () = {

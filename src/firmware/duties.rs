@@ -4,7 +4,8 @@
 use crate::{
     app::app::NETWORK,
     configurator::Configurator,
-    derived::{AXES, RPDOS_US},
+    derived::{AXES, CONTROLLERS, RPDOS_US},
+    lines::{self, Line, PRODUCING},
     own_node::Mirror,
 };
 use canmaster::{
@@ -12,11 +13,10 @@ use canmaster::{
     boot::{Action, NetworkBoot},
     design,
     device::{Event, Setting},
-    master::TxQueue,
     motion::{FaultCause, GroupEvent, GroupState},
     nmt::{Command, NodeControl, Service, State, Target},
 };
-use nucleo_g474re::{can, pac::Interrupt};
+use core::sync::atomic::Ordering::Relaxed;
 use rtic::mutex_prelude::*;
 
 impl Configurator<'_> {
@@ -29,10 +29,7 @@ impl Configurator<'_> {
             *control
         });
         self.local.own.restart(now);
-        let room = self
-            .shared
-            .tx_queue
-            .lock(|queue| queue.len() < design::OWN_FRAMES);
+        let room = lines::have_room(&mut self.shared.lines, design::OWN_FRAMES);
         let board = &mut Mirror {
             network: NETWORK,
             boot: self.local.boot,
@@ -132,12 +129,12 @@ impl Configurator<'_> {
             window => (window as u16).saturating_sub(RPDOS_US),
         };
         let shared = &mut self.shared;
-        (&mut shared.control, &mut shared.od).lock(|control, od| {
+        (&mut shared.control, &mut shared.sender).lock(|control, sender| {
             control.cycle_differs = differs;
             control.latest_us = latest_us;
-            od.set_sync_producer(produces);
+            PRODUCING.store(produces, Relaxed);
             if anew {
-                od.set_sync_counter(sync.counter());
+                sender.counter = sync.counter();
             }
         });
     }
@@ -145,8 +142,7 @@ impl Configurator<'_> {
     /// Queues a frame. A full queue counts it: an SDO request is repeated, by us
     /// or by the client.
     fn send(&mut self, frame: Frame) {
-        let _ = self.shared.tx_queue.lock(|queue| queue.put(frame));
-        rtic::pend(Interrupt::FDCAN1_IT0);
+        lines::send(&mut self.shared.lines, frame, usize::MAX);
     }
 
     /// Carries out what the boot-up asks for.
@@ -158,8 +154,14 @@ impl Configurator<'_> {
                 self.take_over(Setting::SyncCobId);
             }
             Action::RestartController => {
-                self.shared.tx_queue.lock(TxQueue::clear);
-                self.shared.can_tx.lock(can::Tx::restart);
+                self.shared
+                    .lines
+                    .lock(|lines| lines.iter_mut().for_each(Line::clear));
+                for controller in CONTROLLERS {
+                    self.shared
+                        .sender
+                        .lock(|sender| sender.tx.restart(controller));
+                }
             }
             Action::Report(event) => {
                 self.local.own.boot(event);

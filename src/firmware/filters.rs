@@ -8,8 +8,8 @@ use nucleo_g474re::can::{Fifo, RangeFilter};
 /// What a received frame is.
 #[derive(Clone, Copy)]
 pub(crate) enum Handler {
-    /// A TPDO: 0 for TPDO1, 1 for TPDO2.
-    Tpdo(usize),
+    /// FIFO 0: a TPDO. The index of its filter is its number, counted from 0.
+    Tpdo,
     Emcy,
     /// To something that `sdo_configurator` asked: SDO, LSS.
     Answer,
@@ -55,8 +55,8 @@ pub(crate) static FILTERS: [RangeFilter; 9] = [
 
 /// The handler of each filter.
 pub(crate) static HANDLERS: [Handler; FILTERS.len()] = [
-    Handler::Tpdo(0),
-    Handler::Tpdo(1),
+    Handler::Tpdo,
+    Handler::Tpdo,
     Handler::Emcy,
     Handler::Answer,
     Handler::ErrorControl,

@@ -23,9 +23,13 @@ mod hard_fault;
 #[cfg(target_os = "none")]
 mod leds;
 #[cfg(target_os = "none")]
+mod lines;
+#[cfg(target_os = "none")]
 mod log;
 #[cfg(target_os = "none")]
 mod own_node;
+#[cfg(target_os = "none")]
+mod reception;
 #[cfg(target_os = "none")]
 mod report;
 #[cfg(target_os = "none")]

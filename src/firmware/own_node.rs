@@ -19,7 +19,8 @@ use canmaster::{
     design,
     device::{self, Description, Device, Identity, MasterError, Setting, Settings},
     emcy::EmcyCode,
-    master::{MasterOd, Notice, TpdoSlot, WrongLength},
+    frame::MAX_DATA,
+    master::{IMAGE_BYTES, MasterOd, Notice, WrongLength},
     motion::{AxisCommand, FaultCause, GroupEvent, GroupState},
     network::Network,
     nmt::{Command, ErrorControl, NodeControl, State, Target},
@@ -102,29 +103,27 @@ where
     }
 
     fn tpdo(&mut self, node: NodeId, number: u8) -> [u8; 8] {
-        let slot = self.network.find(node).and_then(|(axis, _)| {
-            let number = usize::from(number).checked_sub(1)?;
-            TpdoSlot::new(axis, number)
-        });
-        slot.map(|slot| self.od.lock(|od| od.tpdo(slot)))
-            .unwrap_or_default()
+        let image = self
+            .network
+            .find(node)
+            .map(|(axis, _)| self.od.lock(|od| *od.image(axis)));
+        pdo(&image.unwrap_or([0; IMAGE_BYTES]), number)
     }
 
     fn rpdo(&mut self, node: NodeId, number: u8) -> [u8; 8] {
-        let Some((axis, _)) = self.network.find(node) else {
-            return [0; 8];
-        };
-        let command = self.commands.lock(|commands| commands.get(axis).copied());
-        let command = command.unwrap_or_default();
-        let number = number.saturating_sub(1);
-        let pdos = PDOS.get(axis);
-        let frame = pdos.and_then(|pdos| pdos.rpdo(number, node, &command));
-        let mut bytes = [0; 8];
-        for (byte, sent) in bytes.iter_mut().zip(frame.iter().flat_map(Frame::data)) {
-            *byte = *sent;
-        }
-        bytes
+        let image = self.network.find(node).and_then(|(axis, _)| {
+            let command = self.commands.lock(|commands| commands.get(axis).copied())?;
+            Some(PDOS.get(axis)?.image(&command))
+        });
+        pdo(&image.unwrap_or([0; IMAGE_BYTES]), number)
     }
+}
+
+/// The PDO `number`, counted from 1.
+fn pdo(image: &[u8; IMAGE_BYTES], number: u8) -> [u8; 8] {
+    let place = usize::from(number.wrapping_sub(1)) * MAX_DATA;
+    let bytes = image.get(place..).and_then(|rest| rest.first_chunk());
+    bytes.copied().unwrap_or_default()
 }
 
 /// See the module.

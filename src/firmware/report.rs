@@ -19,7 +19,7 @@ pub(crate) fn tell(
 /// Hands something to the log.
 pub(crate) fn publish(to: &mut Producer<'static, News>, news: News) {
     if to.enqueue(news).is_err() {
-        counters::LOG_FULL.count();
+        counters::LOG_FULL.add(1);
     }
     wake::want();
 }

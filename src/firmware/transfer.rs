@@ -4,18 +4,16 @@
 //! nothing from it. A node that boots again under the test is silent for the
 //! boot-up until the test has failed, which it does within its timeout.
 
-use crate::derived::TX_QUEUE;
+use crate::lines::{self, Lines};
 use canmaster::{
     Frame, NodeId, design,
     device::TransferTest,
     id::CobId,
-    master::TxQueue,
     sdo::{AbortCode, Channel, Course, Link, Session, TestData},
     time::{Duration, Instant},
 };
 use core::sync::atomic::{AtomicU16, Ordering::Relaxed};
 use heapless::spsc::Consumer;
-use nucleo_g474re::pac::Interrupt;
 use rtic::Mutex;
 
 /// How long the node may take for an answer; and after a failure everything that
@@ -34,11 +32,11 @@ pub(crate) fn wants(id: CobId) -> bool {
 /// The bus and the clock as the test has them.
 struct Bus<'a, T> {
     answers: &'a mut Consumer<'static, Frame>,
-    tx_queue: &'a mut T,
+    lines: &'a mut T,
     now: Instant,
 }
 
-impl<T: Mutex<T = TxQueue<TX_QUEUE>>> Link for Bus<'_, T> {
+impl<T: Mutex<T = Lines>> Link for Bus<'_, T> {
     fn now(&self) -> Instant {
         self.now
     }
@@ -46,11 +44,7 @@ impl<T: Mutex<T = TxQueue<TX_QUEUE>>> Link for Bus<'_, T> {
     /// Where there is no room, the queue is looked at again in the next
     /// millisecond: it does not run empty before.
     fn send(&mut self, frame: Frame) -> bool {
-        let sent = self
-            .tx_queue
-            .lock(|queue| queue.len() < design::OWN_FRAMES && queue.put(frame).is_ok());
-        rtic::pend(Interrupt::FDCAN1_IT0);
-        sent
+        lines::send(self.lines, frame, design::OWN_FRAMES)
     }
 
     fn receive(&mut self) -> Option<Frame> {
@@ -88,7 +82,7 @@ pub(crate) fn go_on(
     transfer: &mut Option<Transfer>,
     test: &mut TransferTest,
     answers: &mut Consumer<'static, Frame>,
-    tx_queue: &mut impl Mutex<T = TxQueue<TX_QUEUE>>,
+    lines: &mut impl Mutex<T = Lines>,
     now: Instant,
 ) -> Option<Instant> {
     if !test.is_under_way() {
@@ -102,7 +96,7 @@ pub(crate) fn go_on(
     } = transfer.get_or_insert_with(|| Transfer::new(test, now));
     let bus = &mut Bus {
         answers,
-        tx_queue,
+        lines,
         now,
     };
     let result = match session.go_on(channel, bus, data) {

@@ -4,9 +4,9 @@
 //! | direction | objects |
 //! |---|---|
 //! | to the drive | controlword 6040h, target velocity 60FFh, profile acceleration 6083h, profile deceleration 6084h |
-//! | from the drive | statusword 6041h, position 6064h, velocity 606Ch, torque 6077h (may be left out) |
+//! | from the drive | statusword 6041h, position 6064h; velocity 606Ch and torque 6077h may be left out |
 
-use super::od::TPDOS_PER_AXIS;
+use super::od::{IMAGE_BYTES, TPDOS_PER_AXIS};
 use crate::frame::{Frame, MAX_DATA};
 use crate::id::{Address, CobId, FunctionCode, NodeId};
 use crate::motion::{AxisCommand, AxisFeedback};
@@ -30,15 +30,16 @@ const POSITION: MappingEntry = entry(objects::POSITION_ACTUAL, 32);
 const VELOCITY: MappingEntry = entry(objects::VELOCITY_ACTUAL, 32);
 const TORQUE: MappingEntry = entry(objects::TORQUE_ACTUAL, 16);
 
-/// Where an object lies: from which bit of the PDOs on, put one behind the other
-/// with [`PDO_BITS`] each.
+/// Where an object lies: from which byte of the PDOs on, put one behind the other
+/// with eight each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Place(u8);
 
-const PDO_BITS: u8 = u64::BITS as u8;
-
 /// An object that is not mapped lies behind all that is.
-const NOWHERE: Place = Place(PDO_BITS * PDOS as u8);
+const NOWHERE: Place = Place((MAX_DATA * PDOS) as u8);
+
+/// The objects of one direction as they lie in the PDOs.
+type Image = [u8; IMAGE_BYTES];
 
 impl Place {
     /// The first place of `wanted` in these PDOs; `None`: not mapped.
@@ -48,7 +49,8 @@ impl Place {
             let (mut entries, mut bit) = (pdo.mapping, 0);
             while let Some((mapped, more)) = entries.split_first() {
                 if mapped.0 == wanted.0 && pdo.number as usize <= PDOS {
-                    return Some(Place(pdo.number.saturating_sub(1) * PDO_BITS + bit));
+                    let first = pdo.number.saturating_sub(1) * MAX_DATA as u8;
+                    return Some(Place(first + bit / u8::BITS as u8));
                 }
                 bit += mapped.bits();
                 entries = more;
@@ -58,22 +60,33 @@ impl Place {
         None
     }
 
-    /// In which PDO, counted from 0.
-    const fn pdo(self) -> u8 {
-        self.0 / PDO_BITS
+    /// The same; [`NOWHERE`] if it is not mapped.
+    const fn find_or_nowhere(pdos: &[Pdo], wanted: MappingEntry) -> Place {
+        match Place::find(pdos, wanted) {
+            Some(place) => place,
+            None => NOWHERE,
+        }
     }
 
-    /// From which of its bits on.
-    const fn bit(self) -> u8 {
-        self.0 % PDO_BITS
+    /// In which PDO, counted from 0.
+    const fn pdo(self) -> u8 {
+        self.0 / MAX_DATA as u8
     }
 
     /// The object and what follows it; 0 if it is not mapped.
-    #[inline(never)]
-    fn read(self, pdos: &[[u8; MAX_DATA]; PDOS]) -> u32 {
-        let bytes = pdos.get(usize::from(self.pdo()));
-        let word = u64::from_le_bytes(bytes.copied().unwrap_or_default());
-        (word >> self.bit()) as u32
+    #[inline]
+    fn read(self, image: &Image) -> u32 {
+        let bytes = image.get(usize::from(self.0)..).and_then(<[u8]>::first_chunk);
+        bytes.map_or(0, |bytes| u32::from_le_bytes(*bytes))
+    }
+
+    /// Writes the first bytes of `value`.
+    #[inline]
+    fn write<const BYTES: usize>(self, image: &mut Image, value: [u8; BYTES]) {
+        let place = image.get_mut(usize::from(self.0)..);
+        if let Some(bytes) = place.and_then(<[u8]>::first_chunk_mut) {
+            *bytes = value;
+        }
     }
 }
 
@@ -128,7 +141,6 @@ impl AxisPdos {
             Some(deceleration),
             Some(statusword),
             Some(position),
-            Some(velocity),
         ) = (
             Place::find(node.rpdos, CONTROLWORD),
             Place::find(node.rpdos, TARGET_VELOCITY),
@@ -136,15 +148,12 @@ impl AxisPdos {
             Place::find(node.rpdos, DECELERATION),
             Place::find(node.tpdos, STATUSWORD),
             Place::find(node.tpdos, POSITION),
-            Place::find(node.tpdos, VELOCITY),
         )
         else {
             return None;
         };
-        let torque = match Place::find(node.tpdos, TORQUE) {
-            Some(place) => place,
-            None => NOWHERE,
-        };
+        let velocity = Place::find_or_nowhere(node.tpdos, VELOCITY);
+        let torque = Place::find_or_nowhere(node.tpdos, TORQUE);
         Some(AxisPdos {
             commands: [controlword, target, acceleration, deceleration],
             feedback: [statusword, position, velocity, torque],
@@ -188,14 +197,21 @@ impl AxisPdos {
         bytes
     }
 
+    /// Whether a TPDO carries the velocity. If none does, it is for a
+    /// [`Speedometer`](crate::motion::Speedometer) to find out.
+    pub const fn has_velocity(&self) -> bool {
+        let [_, _, velocity, _] = &self.feedback;
+        velocity.0 != NOWHERE.0
+    }
+
     /// What the TPDOs of the axis say. `fresh`: all came with this SYNC.
-    pub fn feedback(&self, tpdos: &[[u8; MAX_DATA]; PDOS], fresh: bool) -> AxisFeedback {
-        let [statusword, position, velocity, torque] = self.feedback.map(|at| at.read(tpdos));
+    pub fn feedback(&self, image: &Image, fresh: bool) -> AxisFeedback {
+        let [statusword, position, velocity, torque] = self.feedback;
         AxisFeedback {
-            statusword: statusword as u16,
-            position: position as i32,
-            velocity: velocity as i32,
-            torque: torque as i16,
+            statusword: statusword.read(image) as u16,
+            position: position.read(image) as i32,
+            velocity: velocity.read(image) as i32,
+            torque: torque.read(image) as i16,
             fresh,
         }
     }
@@ -207,30 +223,28 @@ impl AxisPdos {
         controlword.pdo() != number && velocity.pdo() != number
     }
 
+    /// The RPDOs of the axis.
+    pub fn image(&self, command: &AxisCommand) -> Image {
+        let mut image = [0; IMAGE_BYTES];
+        let [controlword, velocity, acceleration, deceleration] = self.commands;
+        controlword.write(&mut image, command.controlword.to_le_bytes());
+        velocity.write(&mut image, command.velocity.to_le_bytes());
+        acceleration.write(&mut image, command.acceleration.to_le_bytes());
+        deceleration.write(&mut image, command.deceleration.to_le_bytes());
+        image
+    }
+
     /// The RPDO `number`, counted from 0, for `node`. `None`: it has none.
-    #[inline(never)]
-    pub fn rpdo(&self, number: u8, node: NodeId, command: &AxisCommand) -> Option<Frame> {
-        let function = if number == 0 {
-            FunctionCode::Rpdo1
-        } else {
-            FunctionCode::Rpdo2
+    pub fn rpdo(&self, number: u8, node: NodeId, image: &Image) -> Option<Frame> {
+        let function = match number {
+            0 => FunctionCode::Rpdo1,
+            _ => FunctionCode::Rpdo2,
         };
-        let length = usize::from(*self.rpdo_bytes.get(usize::from(number))?);
-        let values = [
-            u32::from(command.controlword),
-            command.velocity as u32,
-            command.acceleration,
-            command.deceleration,
-        ];
-        let mut word = 0;
-        for (at, value) in self.commands.iter().zip(values) {
-            if at.pdo() == number {
-                word |= u64::from(value) << at.bit();
-            }
-        }
-        let bytes = word.to_le_bytes();
-        let data = bytes.get(..length).filter(|data| !data.is_empty())?;
-        Frame::data_frame(CobId::of(function, node), data)
+        let number = usize::from(number);
+        let length = *self.rpdo_bytes.get(number)?;
+        let data = image.get(number * MAX_DATA..)?.first_chunk()?;
+        let frame = Frame::of_padded(CobId::of(function, node), length, *data);
+        (length > 0).then_some(frame)
     }
 }
 
@@ -241,6 +255,12 @@ mod tests {
 
     fn pdos() -> [AxisPdos; 6] {
         AxisPdos::of_all(&SIX_EPOS4).unwrap()
+    }
+
+    fn image(tpdos: [[u8; MAX_DATA]; PDOS]) -> Image {
+        let mut image = [0; IMAGE_BYTES];
+        image[..PDOS * MAX_DATA].copy_from_slice(&tpdos.concat());
+        image
     }
 
     #[test]
@@ -260,20 +280,20 @@ mod tests {
     fn golden_bytes_both_ways() {
         let [pdos, ..] = pdos();
         let node = NodeId::constant::<3>();
-        let frame = pdos.rpdo(0, node, &COMMAND).unwrap();
+        let frame = pdos.rpdo(0, node, &pdos.image(&COMMAND)).unwrap();
         assert_eq!(frame.id().get(), 0x203);
         assert_eq!(frame.data(), [0x0F, 0x00, 0x50, 0xFB, 0xFF, 0xFF]);
-        let frame = pdos.rpdo(1, node, &COMMAND).unwrap();
+        let frame = pdos.rpdo(1, node, &pdos.image(&COMMAND)).unwrap();
         assert_eq!(frame.id().get(), 0x303);
         assert_eq!(frame.data(), [0xDC, 0x05, 0, 0, 4, 3, 2, 1]);
-        assert_eq!(pdos.rpdo(2, node, &COMMAND), None);
+        assert_eq!(pdos.rpdo(2, node, &pdos.image(&COMMAND)), None);
         assert!(!pdos.has_only_ramps(0) && pdos.has_only_ramps(1));
 
         let got = pdos.feedback(
-            &[
+            &image([
                 [0x37, 0x16, 0xFE, 0xFF, 0xFF, 0xFF, 0xAA, 0xAA],
                 [0xE8, 0x03, 0, 0, 0x9C, 0xFF, 0xAA, 0xAA],
-            ],
+            ]),
             true,
         );
         let expected = AxisFeedback {
@@ -311,19 +331,29 @@ mod tests {
             ..crate::network::sample::epos4(NodeId::constant::<7>(), "axis 7")
         };
         let pdos = AxisPdos::of(&node).unwrap();
-        let frame = pdos.rpdo(0, node.id, &COMMAND).unwrap();
+        let frame = pdos.rpdo(0, node.id, &pdos.image(&COMMAND)).unwrap();
         assert_eq!(frame.data(), [4, 3, 2, 1, 0xDC, 0x05, 0, 0]);
-        let frame = pdos.rpdo(1, node.id, &COMMAND).unwrap();
+        let frame = pdos.rpdo(1, node.id, &pdos.image(&COMMAND)).unwrap();
         assert_eq!(frame.data(), [0x50, 0xFB, 0xFF, 0xFF, 0x0F, 0x00]);
         assert!(pdos.has_only_ramps(0) && !pdos.has_only_ramps(1));
-        let tpdos = [
+        let tpdos = image([
             [3, 0xE8, 0x03, 0, 0, 0, 0, 0],
             [0xFE, 0xFF, 0xFF, 0xFF, 3, 0x37, 0x16, 0],
-        ];
+        ]);
         let got = pdos.feedback(&tpdos, false);
         assert_eq!((got.statusword, got.position), (0x1637, -2));
         assert_eq!((got.velocity, got.torque), (1000, 0));
         assert_eq!(AxisPdos::tpdo_bytes(&[pdos]), [[5, 7]]);
+
+        assert!(pdos.has_velocity());
+        let slow = AxisPdos::of(&Node {
+            tpdos: &[pdo(1, &[STATUSWORD, POSITION])],
+            ..node
+        });
+        let slow = slow.unwrap();
+        assert!(!slow.has_velocity());
+        assert_eq!(AxisPdos::tpdo_bytes(&[slow]), [[6, 0]]);
+        assert_eq!(slow.feedback(&tpdos, true).velocity, 0);
 
         let blind = Node { tpdos: &[], ..node };
         assert_eq!(AxisPdos::of(&blind), None);

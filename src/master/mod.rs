@@ -7,6 +7,7 @@
 
 mod axis_map;
 mod axis_pdo;
+mod burst;
 mod clock;
 mod debounce;
 mod od;
@@ -17,10 +18,11 @@ mod tx_queue;
 
 pub use axis_map::AxisMap;
 pub use axis_pdo::AxisPdos;
+pub use burst::Burst;
 pub use clock::ExtendedClock;
 pub use debounce::Debounce;
-pub use od::{Cycle, MasterOd, Reception, TPDOS_PER_AXIS, TpdoSlot, TpdoSlots, WrongLength};
+pub use od::{Cycle, IMAGE_BYTES, MasterOd, Reception, TPDOS_PER_AXIS, TpdoSlot, TpdoSlots, WrongLength};
 pub use ramps::Ramps;
 pub use roll_call::RollCall;
 pub use supervisor::{Advice, Notice, Report, Supervisor};
-pub use tx_queue::{Overflow, Put, TxQueue};
+pub use tx_queue::{Overflow, Pending, Put, TxQueue, holds, room};

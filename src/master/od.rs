@@ -1,12 +1,13 @@
 //! The cyclic part of the master's object dictionary: what the interrupt tasks
-//! share. Each access touches one entry and is done in a few cycles, for it
-//! holds off the SYNC.
+//! share. Each access touches one entry and is done in a few cycles.
 
 use crate::frame::MAX_DATA;
-use crate::sync::SyncCounter;
 
 /// How many TPDOs of each axis the master takes in.
 pub const TPDOS_PER_AXIS: usize = 2;
+/// Bytes of the process image of an axis in one direction: its PDOs one behind the
+/// other, and four zeros, which are what an object is that is not mapped.
+pub const IMAGE_BYTES: usize = TPDOS_PER_AXIS * MAX_DATA + 4;
 /// The bits of a set of TPDOs.
 const SLOTS_MAX: usize = u32::BITS as usize;
 
@@ -119,6 +120,8 @@ pub struct WrongLength {
 pub struct Cycle {
     /// The number of its SYNC, counted from 1.
     pub sync: u32,
+    /// Cycles since the one taken up before: more than one if some were not.
+    pub passed: u32,
     /// The expected TPDOs that did not come in time.
     pub missing: TpdoSlots,
 }
@@ -126,11 +129,10 @@ pub struct Cycle {
 /// The cyclic part of the object dictionary of a master of `AXES` axes.
 #[derive(Debug)]
 pub struct MasterOd<const AXES: usize> {
-    /// 1005h, bit 30.
-    sync_producer: bool,
-    sync_count: u32,
-    /// 1019h.
-    sync_counter: SyncCounter,
+    /// The number of the SYNC that the cycle began with.
+    sync: u32,
+    /// That of the cycle that was last taken up.
+    taken: u32,
     expected: TpdoSlots,
     received: TpdoSlots,
     /// The cycle of the last SYNC has not been taken up yet.
@@ -140,51 +142,24 @@ pub struct MasterOd<const AXES: usize> {
     /// The mapped bytes of each TPDO.
     lengths: &'static [[u8; TPDOS_PER_AXIS]; AXES],
     /// What last came.
-    tpdos: [[[u8; MAX_DATA]; TPDOS_PER_AXIS]; AXES],
+    tpdos: [[u8; IMAGE_BYTES]; AXES],
 }
 
 impl<const AXES: usize> MasterOd<AXES> {
-    /// SYNC off. `lengths` are the mapped bytes of each TPDO of each axis, each of
-    /// which every SYNC has to bring.
+    /// `lengths` are the mapped bytes of each TPDO of each axis, each of which
+    /// every SYNC has to bring.
     pub const fn new(lengths: &'static [[u8; TPDOS_PER_AXIS]; AXES]) -> MasterOd<AXES> {
         MasterOd {
-            sync_producer: false,
-            sync_count: 0,
-            sync_counter: SyncCounter::NONE,
+            sync: 0,
+            taken: 0,
             expected: TpdoSlots::with_bytes(lengths),
             received: TpdoSlots::NONE,
             open: false,
             overruns: 0,
             wrong_length: None,
             lengths,
-            tpdos: [[[0; MAX_DATA]; TPDOS_PER_AXIS]; AXES],
+            tpdos: [[0; IMAGE_BYTES]; AXES],
         }
-    }
-
-    /// Switches the SYNC producer (1005h, bit 30; CiA 301, 7.5.2.5).
-    pub fn set_sync_producer(&mut self, on: bool) {
-        self.sync_producer = on;
-    }
-
-    /// Whether the SYNC producer is on.
-    pub fn sync_producer(&self) -> bool {
-        self.sync_producer
-    }
-
-    /// Counts the SYNCs (1019h) from the start again.
-    pub fn set_sync_counter(&mut self, counter: SyncCounter) {
-        self.sync_counter = counter;
-    }
-
-    /// What the next SYNC carries; `None`: no data.
-    #[inline]
-    pub fn count_sync(&mut self) -> Option<u8> {
-        self.sync_counter.count()
-    }
-
-    /// SYNCs sent since the start.
-    pub fn sync_count(&self) -> u32 {
-        self.sync_count
     }
 
     /// Cycles that were not taken up before the next SYNC.
@@ -197,13 +172,18 @@ impl<const AXES: usize> MasterOd<AXES> {
         self.wrong_length.take()
     }
 
-    /// A SYNC was requested: the next cycle begins.
+    /// So many SYNCs were sent since the start. If that is news, the next cycle
+    /// has begun. To be called before a TPDO is stored and a cycle is taken up, so
+    /// that the SYNC itself has to wait for nobody.
     #[inline]
-    pub fn open_cycle(&mut self) {
-        self.overruns += u32::from(self.open);
-        self.sync_count = self.sync_count.wrapping_add(1);
-        self.received = TpdoSlots::NONE;
-        self.open = true;
+    pub fn follow(&mut self, syncs: u32) {
+        let passed = syncs.wrapping_sub(self.sync);
+        if passed != 0 {
+            self.overruns = self.overruns.wrapping_add(passed - u32::from(!self.open));
+            self.sync = syncs;
+            self.received = TpdoSlots::NONE;
+            self.open = true;
+        }
     }
 
     /// A TPDO came.
@@ -213,10 +193,11 @@ impl<const AXES: usize> MasterOd<AXES> {
             .lengths
             .get(slot.axis())
             .and_then(|axis| axis.get(slot.number()));
+        let first = slot.number() * MAX_DATA;
         let stored = self
             .tpdos
             .get_mut(slot.axis())
-            .and_then(|axis| axis.get_mut(slot.number()));
+            .and_then(|axis| axis.get_mut(first..first + MAX_DATA));
         let (Some(mapped), Some(stored)) = (mapped, stored) else {
             return Reception::Stored;
         };
@@ -228,7 +209,7 @@ impl<const AXES: usize> MasterOd<AXES> {
                 return Reception::TooShort;
             }
         }
-        *stored = data;
+        stored.copy_from_slice(&data);
         if self.received.contains(slot) {
             return Reception::Stored;
         }
@@ -245,11 +226,12 @@ impl<const AXES: usize> MasterOd<AXES> {
     }
 
     /// Takes up the cycle: once per SYNC, as soon as every expected TPDO is in,
-    /// or at the deadline with what there is. While SYNC is off, the deadline is
-    /// a cycle in which every TPDO is missing: time goes on for the axes.
+    /// or at the deadline with what there is. While the master does not produce
+    /// SYNC, the deadline is a cycle in which every TPDO is missing: time goes on
+    /// for the axes.
     #[inline]
-    pub fn take_cycle(&mut self, deadline: bool) -> Option<Cycle> {
-        let (missing, due) = if self.sync_producer {
+    pub fn take_cycle(&mut self, producing: bool, deadline: bool) -> Option<Cycle> {
+        let (missing, due) = if producing {
             let missing = self.missing();
             (missing, self.open && (missing.is_empty() || deadline))
         } else {
@@ -259,20 +241,19 @@ impl<const AXES: usize> MasterOd<AXES> {
             return None;
         }
         self.open = false;
+        let passed = self.sync.wrapping_sub(self.taken).max(1);
+        self.taken = self.sync;
         Some(Cycle {
-            sync: self.sync_count,
+            sync: self.sync,
+            passed,
             missing,
         })
     }
 
-    /// The data of a TPDO as it last came; zeros before.
+    /// The TPDOs of an axis as they last came; zeros before.
     #[inline]
-    pub fn tpdo(&self, slot: TpdoSlot) -> [u8; MAX_DATA] {
-        self.tpdos
-            .get(slot.axis())
-            .and_then(|axis| axis.get(slot.number()))
-            .copied()
-            .unwrap_or_default()
+    pub fn image(&self, axis: usize) -> &[u8; IMAGE_BYTES] {
+        self.tpdos.get(axis).unwrap_or(&[0; IMAGE_BYTES])
     }
 }
 
@@ -288,8 +269,12 @@ mod tests {
 
     fn running() -> MasterOd<2> {
         let mut od = MasterOd::new(&LENGTHS);
-        od.set_sync_producer(true);
+        od.follow(1);
         od
+    }
+
+    fn bytes(axis: usize, od: &MasterOd<2>) -> [u8; MAX_DATA] {
+        od.image(axis)[..MAX_DATA].try_into().unwrap()
     }
 
     #[test]
@@ -314,59 +299,54 @@ mod tests {
     #[test]
     fn without_sync_the_deadline_alone_makes_the_cycle() {
         let mut od = MasterOd::<2>::new(&LENGTHS);
-        assert!(!od.sync_producer());
-        assert_eq!(od.take_cycle(false), None);
+        assert_eq!(od.take_cycle(false, false), None);
         for slot in TpdoSlots::all_of(2).iter() {
             od.store(slot, [1; 8], 6);
         }
-        assert_eq!(od.take_cycle(false), None);
+        assert_eq!(od.take_cycle(false, false), None);
         for _ in 0..2 {
-            let cycle = od.take_cycle(true).unwrap();
+            let cycle = od.take_cycle(false, true).unwrap();
             assert_eq!(cycle.missing, TpdoSlots::all_of(2));
+            assert_eq!((cycle.sync, cycle.passed), (0, 1));
         }
-        od.set_sync_producer(true);
-        assert!(od.sync_producer());
-        assert_eq!(od.take_cycle(true), None);
-        od.open_cycle();
-        assert_eq!(od.sync_count(), 1);
+        assert_eq!(od.take_cycle(true, true), None);
+        od.follow(1);
+        assert_eq!(od.take_cycle(true, true).unwrap().sync, 1);
     }
 
     #[test]
     fn the_last_expected_tpdo_releases_the_cycle_once() {
         let mut od = running();
-        od.open_cycle();
         assert_eq!(od.store(slot(0, 0), [1; 8], 6), Reception::Stored);
         assert_eq!(od.store(slot(0, 0), [2; 8], 6), Reception::Stored);
         assert_eq!(od.store(slot(1, 0), [3; 8], 6), Reception::Stored);
         assert_eq!(od.store(slot(0, 1), [4; 8], 6), Reception::Stored);
-        assert_eq!(od.take_cycle(false), None);
+        assert_eq!(od.take_cycle(true, false), None);
         assert_eq!(od.store(slot(1, 1), [5; 8], 6), Reception::Last);
         assert_eq!(od.store(slot(1, 1), [5; 8], 6), Reception::Stored);
-        let cycle = od.take_cycle(false).unwrap();
+        let cycle = od.take_cycle(true, false).unwrap();
         assert!(cycle.missing.is_empty());
-        assert_eq!(od.take_cycle(true), None);
-        assert_eq!(od.tpdo(slot(0, 0)), [2; 8]);
+        assert_eq!(od.take_cycle(true, true), None);
+        assert_eq!(bytes(0, &od), [2; 8]);
     }
 
     #[test]
     fn the_deadline_takes_what_there_is_and_names_the_rest() {
         let mut od = running();
-        od.open_cycle();
         od.store(slot(1, 0), [3; 8], 6);
-        let cycle = od.take_cycle(true).unwrap();
+        let cycle = od.take_cycle(true, true).unwrap();
         let missing: std::vec::Vec<_> = cycle.missing.iter().collect();
         assert_eq!(missing, [slot(0, 0), slot(0, 1), slot(1, 1)]);
         // What comes after the deadline opens nothing.
         od.store(slot(0, 0), [3; 8], 6);
         od.store(slot(0, 1), [3; 8], 6);
         assert_eq!(od.store(slot(1, 1), [3; 8], 6), Reception::Stored);
-        assert_eq!(od.take_cycle(true), None);
+        assert_eq!(od.take_cycle(true, true), None);
     }
 
     #[test]
     fn what_is_too_short_is_left_and_what_is_too_long_is_taken() {
         let mut od = running();
-        od.open_cycle();
         assert_eq!(od.take_wrong_length(), None);
         let wrong = |short| {
             let slot = slot(0, 0);
@@ -377,24 +357,30 @@ mod tests {
             assert_eq!(got, Reception::TooShort);
             assert_eq!(od.take_wrong_length(), wrong(true));
         }
-        assert_eq!(od.tpdo(slot(0, 0)), [0; 8]);
+        assert_eq!(bytes(0, &od), [0; 8]);
         for length in [7, 8] {
             let got = od.store(slot(0, 0), [9; 8], length);
             assert_eq!(got, Reception::Stored);
             assert_eq!(od.take_wrong_length(), wrong(false));
             assert_eq!(od.take_wrong_length(), None);
         }
-        assert_eq!(od.tpdo(slot(0, 0)), [9; 8]);
+        assert_eq!(bytes(0, &od), [9; 8]);
     }
 
     #[test]
     fn a_cycle_nobody_takes_is_an_overrun() {
         let mut od = running();
-        od.open_cycle();
-        od.open_cycle();
+        od.follow(1);
+        assert_eq!(od.overruns(), 0);
+        od.follow(2);
         assert_eq!(od.overruns(), 1);
-        od.take_cycle(true);
-        od.open_cycle();
+        assert_eq!(od.take_cycle(true, true).unwrap().passed, 2);
+        od.follow(3);
         assert_eq!(od.overruns(), 1);
+        assert_eq!(od.take_cycle(true, true).unwrap().passed, 1);
+        // Nobody looked for three SYNCs.
+        od.follow(6);
+        assert_eq!(od.overruns(), 3);
+        assert_eq!(od.take_cycle(true, true).unwrap().passed, 3);
     }
 }

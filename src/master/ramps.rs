@@ -1,43 +1,53 @@
-//! When RPDO2, the ramps 6083h and 6084h, is sent: on change, and one drive per
-//! cycle in turn, so that a drive which lost one gets it again soon.
+//! When RPDO2, the ramps 6083h and 6084h, is sent: on change, one drive per cycle;
+//! and now and then again, for a drive that was started anew meanwhile.
 
 use crate::motion::AxisCommand;
 
-/// Which axes get their ramps in a cycle.
+/// Which axis gets its ramps in a cycle.
 #[derive(Debug)]
 pub struct Ramps<const AXES: usize> {
-    /// Acceleration and deceleration as last sent.
-    sent: [Option<(u32, u32)>; AXES],
-    /// The axis whose turn it is.
+    /// Acceleration and deceleration as last sent; 0 is none that a drive takes.
+    sent: [(u32, u32); AXES],
+    /// The axis that was last.
     turn: usize,
+    /// Cycles since.
+    idle: u8,
 }
 
 impl<const AXES: usize> Ramps<AXES> {
     /// Nothing was sent yet.
     pub const fn new() -> Ramps<AXES> {
         Ramps {
-            sent: [None; AXES],
+            sent: [(0, 0); AXES],
             turn: 0,
+            idle: 0,
         }
     }
 
-    /// The axes that get RPDO2 in this cycle: those whose ramps changed, and one
-    /// more in turn.
-    pub fn due(&mut self, commands: &[AxisCommand; AXES]) -> [bool; AXES] {
-        let mut due = [false; AXES];
-        for ((axis, due), (sent, command)) in due
-            .iter_mut()
-            .enumerate()
-            .zip(self.sent.iter_mut().zip(commands))
-        {
-            let ramps = Some((command.acceleration, command.deceleration));
-            *due = *sent != ramps || axis == self.turn;
-            *sent = ramps;
+    /// The axis that gets RPDO2 in this cycle: the next whose ramps changed. If
+    /// none did, one in turn every [`AGAIN`] cycles.
+    pub fn due(&mut self, commands: &[AxisCommand; AXES]) -> Option<usize> {
+        self.idle = self.idle.wrapping_add(1);
+        for _ in 0..AXES {
+            self.turn = (self.turn + 1) % AXES.max(1);
+            let (Some(command), Some(sent)) =
+                (commands.get(self.turn), self.sent.get_mut(self.turn))
+            else {
+                return None;
+            };
+            let ramps = (command.acceleration, command.deceleration);
+            if *sent != ramps || self.idle >= AGAIN {
+                *sent = ramps;
+                self.idle = 0;
+                return Some(self.turn);
+            }
         }
-        self.turn = (self.turn + 1) % AXES.max(1);
-        due
+        None
     }
 }
+
+/// Cycles without a change after which ramps are sent again.
+const AGAIN: u8 = 16;
 
 impl<const AXES: usize> Default for Ramps<AXES> {
     fn default() -> Ramps<AXES> {
@@ -58,21 +68,24 @@ mod tests {
     }
 
     #[test]
-    fn all_at_first_then_one_in_turn() {
+    fn every_change_is_sent_one_in_a_cycle() {
         let mut ramps = Ramps::new();
         let same = commands([(1, 1); 3]);
-        assert_eq!(ramps.due(&same), [true; 3]);
-        assert_eq!(ramps.due(&same), [false, true, false]);
-        assert_eq!(ramps.due(&same), [false, false, true]);
-        assert_eq!(ramps.due(&same), [true, false, false]);
+        assert_eq!(ramps.due(&same), Some(1));
+        assert_eq!(ramps.due(&same), Some(2));
+        assert_eq!(ramps.due(&same), Some(0));
+        assert_eq!(ramps.due(&same), None);
+        let changed = commands([(1, 2), (1, 1), (2, 1)]);
+        assert_eq!(ramps.due(&changed), Some(2));
+        assert_eq!(ramps.due(&changed), Some(0));
+        assert_eq!(ramps.due(&changed), None);
     }
 
     #[test]
-    fn every_change_is_sent_at_once() {
+    fn all_are_sent_again_in_the_long_run() {
         let mut ramps = Ramps::new();
-        ramps.due(&commands([(1, 1); 3]));
-        let changed = commands([(1, 2), (1, 1), (2, 1)]);
-        assert_eq!(ramps.due(&changed), [true, true, true]);
-        assert_eq!(ramps.due(&changed), [false, false, true]);
+        let same = commands([(1, 1); 3]);
+        let sent: std::vec::Vec<_> = (0..100).filter_map(|_| ramps.due(&same)).collect();
+        assert_eq!(sent, [1, 2, 0, 1, 2, 0, 1, 2, 0]);
     }
 }

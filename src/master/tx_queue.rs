@@ -1,6 +1,9 @@
 //! The frames that wait for one of the controller's transmit buffers.
 
-use crate::{frame::Frame, id::CobId};
+use crate::{
+    frame::Frame,
+    id::{CobId, FunctionCode},
+};
 use heapless::Vec;
 
 /// The buffers that frames other than SYNC may occupy. A third stays free, so
@@ -26,8 +29,37 @@ pub enum Put {
     Replaced,
 }
 
-/// A queue of up to `N` frames, most urgent identifier first, first in first out
-/// among equal identifiers.
+/// The identifiers of the frames in the controller's three buffers; numbers above
+/// 7FFh stand for buffers without a frame.
+pub type Pending = [u16; 3];
+
+/// How many more frames other than SYNC the controller may be given.
+#[inline(always)]
+pub fn room(pending: &Pending) -> usize {
+    let [a, b, c] = pending.map(|id| usize::from(id <= ID_MAX && id != CobId::SYNC.get()));
+    SHARED_BUFFERS.saturating_sub(a + b + c)
+}
+
+/// Whether a frame with the identifier `id` is `pending`.
+#[inline(always)]
+pub fn holds(pending: &Pending, id: CobId) -> bool {
+    let [a, b, c] = *pending;
+    let id = id.get();
+    a == id || b == id || c == id
+}
+
+/// How urgent an identifier is: the lower, the more. Heartbeats come next to NMT:
+/// they are rare, and the drives stop without the master's, however much else
+/// there is to send.
+fn rank(id: CobId) -> u16 {
+    match id.split() {
+        Some((FunctionCode::ErrorControl, _)) => CobId::NMT.get() + 1,
+        _ => id.get(),
+    }
+}
+
+/// A queue of up to `N` frames, heartbeats first but for NMT, then the lowest
+/// identifier, first in first out among equal ones.
 #[derive(Debug, Default)]
 pub struct TxQueue<const N: usize> {
     /// The most urgent frame last.
@@ -44,22 +76,13 @@ impl<const N: usize> TxQueue<N> {
         }
     }
 
-    /// Queues `frame` behind all with the same identifier.
+    /// Queues `frame` behind all that are as urgent.
     ///
     /// # Errors
     ///
     /// [`Overflow`], which is also counted.
     pub fn put(&mut self, frame: Frame) -> Result<(), Overflow> {
-        let id = frame.id();
-        let position = self
-            .frames
-            .iter()
-            .position(|queued| queued.id() <= id)
-            .unwrap_or(self.frames.len());
-        self.frames.insert(position, frame).map_err(|_| {
-            self.overflows = self.overflows.saturating_add(1);
-            Overflow { id }
-        })
+        self.insert(frame, false).map(|_| ())
     }
 
     /// Queues `frame`, or lets it take the place of the one with the same
@@ -70,35 +93,50 @@ impl<const N: usize> TxQueue<N> {
     ///
     /// [`Overflow`], which is also counted.
     pub fn put_latest(&mut self, frame: Frame) -> Result<Put, Overflow> {
-        let same = self
-            .frames
-            .iter_mut()
-            .find(|queued| queued.id() == frame.id());
-        if let Some(queued) = same {
-            *queued = frame;
-            return Ok(Put::Replaced);
-        }
-        self.put(frame)?;
-        Ok(Put::Queued)
+        self.insert(frame, true)
     }
 
-    /// Takes the frame to be given to the controller next. `pending` are the
-    /// identifiers in the controller's buffers; numbers above 7FFh stand for
-    /// buffers without a frame.
+    #[inline(never)]
+    fn insert(&mut self, frame: Frame, replace: bool) -> Result<Put, Overflow> {
+        let id = frame.id();
+        let mut place = self.frames.len();
+        while let Some(before) = place.checked_sub(1)
+            && let Some(queued) = self.frames.get_mut(before)
+            && rank(queued.id()) <= rank(id)
+        {
+            if replace && queued.id() == id {
+                *queued = frame;
+                return Ok(Put::Replaced);
+            }
+            place = before;
+        }
+        match self.frames.insert(place, frame) {
+            Ok(()) => Ok(Put::Queued),
+            Err(_) => {
+                self.overflows = self.overflows.saturating_add(1);
+                Err(Overflow { id })
+            }
+        }
+    }
+
+    /// Takes the frame to be given to the controller next.
     ///
     /// `None` if two frames other than SYNC are there already, or if nothing
     /// waits but identifiers that are: the controller does not keep the order of
     /// equal identifiers, so it gets the next only when the last has left.
-    pub fn next(&mut self, pending: &[u16]) -> Option<Frame> {
-        let sync = CobId::SYNC.get();
-        let others = pending.iter().filter(|id| **id <= ID_MAX && **id != sync);
-        if others.count() >= SHARED_BUFFERS {
+    pub fn next(&mut self, pending: &Pending) -> Option<Frame> {
+        self.next_of(pending, |_| true)
+    }
+
+    /// The same, of those whose identifier `may` go now.
+    pub fn next_of(&mut self, pending: &Pending, may: impl Fn(CobId) -> bool) -> Option<Frame> {
+        if room(pending) == 0 {
             return None;
         }
-        let position = self
-            .frames
-            .iter()
-            .rposition(|queued| !pending.contains(&queued.id().get()))?;
+        let position = self.frames.iter().rposition(|queued| {
+            let id = queued.id();
+            may(id) && !holds(pending, id)
+        })?;
         Some(self.frames.remove(position))
     }
 
@@ -129,11 +167,14 @@ mod tests {
     use proptest::prelude::*;
     use std::vec::Vec as StdVec;
 
+    const FREE: u16 = u16::MAX;
+    const NONE: Pending = [FREE; 3];
+
     fn frame(id: u16, tag: u8) -> Frame {
         Frame::data_frame(CobId::new(id).unwrap(), &[tag]).unwrap()
     }
 
-    fn next<const N: usize>(queue: &mut TxQueue<N>, pending: &[u16]) -> Option<(u16, u8)> {
+    fn next<const N: usize>(queue: &mut TxQueue<N>, pending: &Pending) -> Option<(u16, u8)> {
         let frame = queue.next(pending)?;
         Some((frame.id().get(), frame.data()[0]))
     }
@@ -141,11 +182,25 @@ mod tests {
     #[test]
     fn the_lowest_identifier_goes_first_and_equal_ones_in_order() {
         let mut queue = TxQueue::<8>::new();
-        for (id, tag) in [(0x601, 1), (0x201, 1), (0x601, 2), (0x000, 1), (0x201, 2)] {
+        for (id, tag) in [
+            (0x601, 1),
+            (0x201, 1),
+            (0x601, 2),
+            (0x77F, 1),
+            (0x000, 1),
+            (0x201, 2),
+        ] {
             queue.put(frame(id, tag)).unwrap();
         }
-        let order: StdVec<_> = core::iter::from_fn(|| next(&mut queue, &[])).collect();
-        let expected = [(0, 1), (0x201, 1), (0x201, 2), (0x601, 1), (0x601, 2)];
+        let order: StdVec<_> = core::iter::from_fn(|| next(&mut queue, &NONE)).collect();
+        let expected = [
+            (0, 1),
+            (0x77F, 1),
+            (0x201, 1),
+            (0x201, 2),
+            (0x601, 1),
+            (0x601, 2),
+        ];
         assert_eq!(order, expected);
     }
 
@@ -155,15 +210,25 @@ mod tests {
         for (id, tag) in [(0x601, 1), (0x601, 2), (0x602, 1)] {
             queue.put(frame(id, tag)).unwrap();
         }
-        assert_eq!(next(&mut queue, &[0x601]), Some((0x602, 1)));
-        assert_eq!(next(&mut queue, &[0x601]), None);
-        assert_eq!(next(&mut queue, &[]), Some((0x601, 1)));
+        assert_eq!(next(&mut queue, &[0x601, FREE, FREE]), Some((0x602, 1)));
+        assert_eq!(next(&mut queue, &[0x601, FREE, FREE]), None);
+        assert_eq!(next(&mut queue, &NONE), Some((0x601, 1)));
+    }
+
+    #[test]
+    fn some_may_have_to_wait() {
+        let mut queue = TxQueue::<8>::new();
+        queue.put(frame(0x301, 1)).unwrap();
+        queue.put(frame(0x601, 1)).unwrap();
+        let sdo = queue.next_of(&NONE, |id| id.get() > 0x580).unwrap();
+        assert_eq!(sdo.id().get(), 0x601);
+        assert_eq!(queue.next_of(&NONE, |id| id.get() > 0x580), None);
+        assert_eq!(queue.len(), 1);
     }
 
     #[test]
     fn one_buffer_stays_free_for_sync() {
         let mut queue = TxQueue::<8>::new();
-        const FREE: u16 = u16::MAX;
         queue.put(frame(0x201, 1)).unwrap();
         assert_eq!(next(&mut queue, &[FREE, 0x301, 0x302]), None);
         assert_eq!(next(&mut queue, &[0x080, 0x301, FREE]), Some((0x201, 1)));
@@ -186,7 +251,7 @@ mod tests {
         let mut queue = TxQueue::<4>::new();
         assert_eq!(queue.put_latest(frame(0x201, 1)), Ok(Put::Queued));
         assert_eq!(queue.put_latest(frame(0x201, 2)), Ok(Put::Replaced));
-        assert_eq!(next(&mut queue, &[]), Some((0x201, 2)));
+        assert_eq!(next(&mut queue, &NONE), Some((0x201, 2)));
         assert!(queue.is_empty());
     }
 
@@ -201,7 +266,7 @@ mod tests {
             let mut model: StdVec<(u16, u8)> =
                 ids.iter().enumerate().map(|(tag, id)| (*id, tag as u8)).collect();
             model.sort_by_key(|(id, _)| *id);
-            let order: StdVec<_> = core::iter::from_fn(|| next(&mut queue, &[])).collect();
+            let order: StdVec<_> = core::iter::from_fn(|| next(&mut queue, &NONE)).collect();
             prop_assert_eq!(order, model);
         }
     }

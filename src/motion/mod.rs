@@ -17,6 +17,7 @@ mod profile;
 mod program;
 mod reference;
 mod scale;
+mod speedometer;
 
 pub use group::{
     AxisCommand, AxisConfig, AxisFeedback, FaultCause, Group, GroupConfig, GroupEvent, GroupState,
@@ -27,3 +28,4 @@ pub use profile::{Limits, NotFeasible, Profile, Setpoint, Timing};
 pub use program::{AxisMove, Limit, PlanError, Program, Step};
 pub use reference::{Ramp, Reference};
 pub use scale::Scale;
+pub use speedometer::Speedometer;

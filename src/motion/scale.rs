@@ -37,6 +37,11 @@ impl Scale {
         rpm_per_s * self.per_rpm / self.cycles_per_second
     }
 
+    /// rpm that are one increment per cycle.
+    pub const fn rpm_per_increment(self) -> f32 {
+        1.0 / self.per_rpm
+    }
+
     /// Increments per cycle to rpm.
     pub fn rpm(self, velocity: f32) -> f32 {
         velocity / self.per_rpm

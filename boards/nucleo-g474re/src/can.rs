@@ -1,4 +1,4 @@
-//! FDCAN1: the fdcan crate configures it, the way of each frame is
+//! FDCAN1, 2 and 3: the fdcan crate configures them, the way of each frame is
 //! here.
 //!
 //! Not through that crate's own transmit and receive calls: they turn a frame
@@ -9,15 +9,12 @@ mod element;
 mod setup;
 
 pub use element::{Element, RxElement};
-pub use setup::BitTiming;
+pub use setup::{BitTiming, Settings};
 pub(crate) use setup::setup;
 
 use crate::message_ram::{self, DEPTH};
-use embedded_can::StandardId;
-use stm32g4xx_hal::{
-    can::Can,
-    pac::{self, fdcan::RegisterBlock},
-};
+use core::sync::atomic::{AtomicU16, Ordering::Relaxed};
+use stm32g4xx_hal::pac::{self, fdcan::RegisterBlock};
 
 /// How many range filters the controller has for standard identifiers.
 pub const FILTERS: usize = 28;
@@ -48,12 +45,44 @@ pub struct RangeFilter {
     pub fifo: Fifo,
 }
 
-fn registers() -> &'static RegisterBlock {
-    // SAFETY: FDCAN1's registers exist for the whole run, all accesses to them
-    // are volatile, and who may write which is divided below: `Tx` owns the
-    // TX* registers and CCCR, `Rx` all others. Each of them exists once, made by `setup`,
-    // which consumed the peripheral.
-    unsafe { &*pac::FDCAN1::ptr() }
+/// One of the chip's controllers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Controller(usize);
+
+impl Controller {
+    /// On PA11 and PA12.
+    pub const FDCAN1: Controller = Controller(0);
+    /// On PB12 and PB13.
+    pub const FDCAN2: Controller = Controller(1);
+    /// On PA8 and PA15.
+    pub const FDCAN3: Controller = Controller(2);
+
+    /// FDCAN1, FDCAN2 or FDCAN3.
+    pub const fn fdcan(number: u8) -> Option<Controller> {
+        match number {
+            1..=CONTROLLERS => Some(Controller(number as usize - 1)),
+            _ => None,
+        }
+    }
+
+    /// Counted from 0.
+    pub(crate) const fn index(self) -> usize {
+        self.0
+    }
+}
+
+const CONTROLLERS: u8 = 3;
+/// From the registers of one controller to those of the next.
+const NEXT: usize = 0x400;
+
+#[inline(always)]
+fn registers(of: Controller) -> &'static RegisterBlock {
+    let address = pac::FDCAN1::ptr() as usize + of.index() * NEXT;
+    // SAFETY: the registers of the three controllers exist for the whole run, all
+    // accesses to them are volatile, and who may write which is divided below:
+    // `Tx` owns the TX* registers and CCCR, `Rx` all others. Each of them exists
+    // once, made by `setup`, which consumed the peripherals.
+    unsafe { &*(address as *const RegisterBlock) }
 }
 
 /// Why a frame was not accepted for transmission.
@@ -63,14 +92,43 @@ pub enum TransmitError {
     Full,
 }
 
-/// The transmitting half.
+/// The identifier that each buffer was last filled with.
+static IDENTIFIERS: [[AtomicU16; DEPTH]; CONTROLLERS as usize] =
+    [const { [const { AtomicU16::new(FREE) }; DEPTH] }; CONTROLLERS as usize];
+
+/// The transmitting half of all controllers.
 ///
-/// The controller sends the frame with the lowest identifier first. Frames with
+/// A controller sends the frame with the lowest identifier first. Frames with
 /// *equal* identifiers would go by buffer number, so never have two of them
-/// here: [`Tx::holds`].
+/// there: [`pending`].
 pub struct Tx {
-    /// The identifier that each buffer was last filled with.
-    identifiers: [u16; DEPTH],
+    /// Made by `setup` alone.
+    _only: (),
+}
+
+/// The identifiers of the frames that wait to be sent; [`FREE`] for a buffer
+/// without one. For any task: a frame that is requested meanwhile may be missing.
+#[inline(always)]
+pub fn pending(of: Controller) -> [u16; BUFFERS] {
+    // A request shows in TXBRP only when the controller's scan is done.
+    let waiting =
+        registers(of).txbrp().read().bits() | registers(of).txbar().read().bits();
+    let mut pending = [FREE; BUFFERS];
+    let (Some(held), true) = (IDENTIFIERS.get(of.index()), waiting != 0) else {
+        // The way of almost every SYNC.
+        return pending;
+    };
+    // One by one: at this place iterators cost more than what they save.
+    if waiting & 0b001 != 0 {
+        pending[0] = held[0].load(Relaxed);
+    }
+    if waiting & 0b010 != 0 {
+        pending[1] = held[1].load(Relaxed);
+    }
+    if waiting & 0b100 != 0 {
+        pending[2] = held[2].load(Relaxed);
+    }
+    pending
 }
 
 impl Tx {
@@ -80,68 +138,31 @@ impl Tx {
     ///
     /// [`TransmitError::Full`]: nothing was changed.
     #[inline(always)]
-    pub fn transmit(&mut self, element: &Element) -> Result<(), TransmitError> {
-        let status = registers().txfqs().read();
-        if status.tfqf().bit_is_set() {
-            return Err(TransmitError::Full);
-        }
+    pub fn transmit(&mut self, by: Controller, element: &Element) -> Result<(), TransmitError> {
+        let status = registers(by).txfqs().read();
         let index = status.tfqpi().bits() as usize;
-        let Some(identifier) = self.identifiers.get_mut(index) else {
+        let held = IDENTIFIERS.get(by.index());
+        let (false, Some(held)) = (
+            status.tfqf().bit_is_set(),
+            held.and_then(|held| held.get(index)),
+        ) else {
             return Err(TransmitError::Full);
         };
-        *identifier = element.identifier();
+        held.store(element.identifier(), Relaxed);
         // SAFETY: the clock was switched on by `setup`; the index was checked
         // against three above; the put index names a buffer without a request;
         // `&mut self` is the only way to Tx buffers.
-        unsafe { message_ram::write_tx(index, element) };
+        unsafe { message_ram::write_tx(by, index, element) };
         // SAFETY: a request bit of a buffer that has just been filled.
-        registers().txbar().write(|w| unsafe { w.bits(1 << index) });
+        registers(by).txbar().write(|w| unsafe { w.bits(1 << index) });
         Ok(())
-    }
-
-    /// The buffers that wait to be sent, as a mask.
-    #[inline(always)]
-    fn waiting(&self) -> u32 {
-        // A request shows in TXBRP only when the controller's scan is done.
-        registers().txbrp().read().bits() | registers().txbar().read().bits()
-    }
-
-    /// Whether a frame with this identifier waits to be sent.
-    #[inline(always)]
-    pub fn holds(&self, identifier: StandardId) -> bool {
-        let waiting = self.waiting();
-        if waiting == 0 {
-            // The way of almost every SYNC.
-            return false;
-        }
-        let raw = identifier.as_raw();
-        let mut found = false;
-        for (index, held) in self.identifiers.iter().enumerate() {
-            found |= waiting & (1 << index) != 0 && *held == raw;
-        }
-        found
-    }
-
-    /// The identifiers of the frames that wait to be sent; [`FREE`] for a buffer
-    /// without one.
-    #[inline(always)]
-    pub fn pending(&self) -> [u16; BUFFERS] {
-        let mut waiting = self.waiting();
-        let mut pending = [FREE; BUFFERS];
-        for (place, held) in pending.iter_mut().zip(&self.identifiers) {
-            if waiting & 1 != 0 {
-                *place = *held;
-            }
-            waiting >>= 1;
-        }
-        pending
     }
 
     /// Takes back every frame that has not started, so that none goes out late:
     /// for use after bus-off.
-    pub fn cancel_all(&mut self) {
+    pub fn cancel_all(&mut self, of: Controller) {
         // SAFETY: cancel bits of the three buffers.
-        registers()
+        registers(of)
             .txbcr()
             .write(|w| unsafe { w.bits((1 << DEPTH) - 1) });
     }
@@ -149,8 +170,8 @@ impl Tx {
     /// Lets the controller take part in the traffic again after bus-off, as soon
     /// as the bus was idle 129 times (ISO 11898-1). Nothing that waited to be sent
     /// before is left.
-    pub fn restart(&mut self) {
-        let control = registers().cccr();
+    pub fn restart(&mut self, controller: Controller) {
+        let control = registers(controller).cccr();
         // Bus-off has set INIT; setting CCE forgets all requests.
         control.modify(|_, w| w.init().set_bit());
         while control.read().init().bit_is_clear() {}
@@ -160,8 +181,8 @@ impl Tx {
     }
 }
 
-/// The controller's error state (ISO 11898-1, fault confinement).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// The controller's error state (ISO 11898-1, fault confinement), the worst last.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ErrorState {
     /// Both error counters below 96.
     Active,
@@ -178,13 +199,45 @@ pub enum ErrorState {
 #[derive(Clone, Copy, Debug)]
 pub struct Flags(u32);
 
+const FLAG_FIFO_0: u32 = 1 << 0;
 const FLAG_FIFO_0_LOST: u32 = 1 << 2;
+const FLAG_FIFO_1: u32 = 1 << 3;
 const FLAG_FIFO_1_LOST: u32 = 1 << 5;
+const FLAG_TX_EVENT: u32 = 1 << 10;
 const FLAG_ERROR_PASSIVE: u32 = 1 << 17;
 const FLAG_ERROR_WARNING: u32 = 1 << 18;
 const FLAG_BUS_OFF: u32 = 1 << 19;
 
+/// Flags that are seldom set.
+const FLAGS_RARE: u32 = FLAG_FIFO_0_LOST
+    | FLAG_FIFO_1_LOST
+    | FLAG_ERROR_PASSIVE
+    | FLAG_ERROR_WARNING
+    | FLAG_BUS_OFF;
+
 impl Flags {
+    /// Frames came into that FIFO since the flags were last taken.
+    #[inline(always)]
+    pub fn received(self, fifo: Fifo) -> bool {
+        let flag = match fifo {
+            Fifo::Fifo0 => FLAG_FIFO_0,
+            Fifo::Fifo1 => FLAG_FIFO_1,
+        };
+        self.0 & flag != 0
+    }
+
+    /// A frame was sent of which the controller tells when.
+    #[inline(always)]
+    pub fn sent_at(self) -> bool {
+        self.0 & FLAG_TX_EVENT != 0
+    }
+
+    /// Something that needs a closer look: a frame lost, the error state.
+    #[inline(always)]
+    pub fn rare(self) -> bool {
+        self.0 & FLAGS_RARE != 0
+    }
+
     /// A frame found its receive FIFO full and was lost.
     pub fn message_lost(self) -> bool {
         self.0 & (FLAG_FIFO_0_LOST | FLAG_FIFO_1_LOST) != 0
@@ -196,57 +249,68 @@ impl Flags {
     }
 }
 
-/// The receiving half, which also tells what the controller has to report.
+/// The receiving half of all controllers, which also tells what they have to
+/// report.
 pub struct Rx {
-    /// Proof that the controller is configured and nobody else's.
-    _configured: fdcan::FdCan<Can<pac::FDCAN1>, fdcan::ConfigMode>,
+    /// Made by `setup` alone.
+    _only: (),
 }
 
 impl Rx {
     /// Reads and clears the interrupt flags. To be called before the FIFOs are
     /// drained, so that a frame that comes meanwhile raises the interrupt again.
     #[inline(always)]
-    pub fn take_flags(&mut self) -> Flags {
-        let flags = registers().ir().read().bits();
+    pub fn take_flags(&mut self, of: Controller) -> Flags {
+        let flags = registers(of).ir().read().bits();
         // SAFETY: ones clear exactly the flags that were read.
-        registers().ir().write(|w| unsafe { w.bits(flags) });
+        registers(of).ir().write(|w| unsafe { w.bits(flags) });
         Flags(flags)
     }
 
     /// The next frame of a FIFO, with the index of the filter that let it in.
     #[inline(always)]
-    pub fn receive(&mut self, fifo: Fifo) -> Option<RxElement> {
-        let (level, index) = match fifo {
-            Fifo::Fifo0 => {
-                let status = registers().rxf0s().read();
-                (status.f0fl().bits(), status.f0gi().bits())
-            }
-            Fifo::Fifo1 => {
-                let status = registers().rxf1s().read();
-                (status.f1fl().bits(), status.f1gi().bits())
-            }
+    pub fn receive(&mut self, from: Controller, fifo: Fifo) -> Option<RxElement> {
+        let registers = registers(from);
+        // Both FIFOs have the same fields.
+        let status = match fifo {
+            Fifo::Fifo0 => registers.rxf0s().read().bits(),
+            Fifo::Fifo1 => registers.rxf1s().read().bits(),
         };
-        if level == 0 || usize::from(index) >= DEPTH {
+        let index = (status >> GET_INDEX_SHIFT & GET_INDEX_MASK) as usize;
+        if status & FILL_LEVEL_MASK == 0 || index >= DEPTH {
             return None;
         }
         // SAFETY: the clock was switched on by `setup`; the index was checked
         // against three; the FIFO is not empty, so its get index names a frame.
-        let element = unsafe { message_ram::read_rx(fifo, index.into()) };
+        let element = unsafe { message_ram::read_rx(from, fifo, index) };
         // SAFETY: acknowledges the element that has just been read.
         match fifo {
-            Fifo::Fifo0 => registers()
-                .rxf0a()
-                .write(|w| unsafe { w.bits(index.into()) }),
-            Fifo::Fifo1 => registers()
-                .rxf1a()
-                .write(|w| unsafe { w.bits(index.into()) }),
+            Fifo::Fifo0 => registers.rxf0a().write(|w| unsafe { w.bits(index as u32) }),
+            Fifo::Fifo1 => registers.rxf1a().write(|w| unsafe { w.bits(index as u32) }),
         };
         Some(element)
     }
 
+    /// When the frame of the oldest event began on the bus: what TIM3 counted
+    /// then. Only frames that asked for it have an event.
+    #[inline(always)]
+    pub fn take_sent_at(&mut self, by: Controller) -> Option<u16> {
+        let registers = registers(by);
+        let status = registers.txefs().read().bits();
+        let index = (status >> GET_INDEX_SHIFT & GET_INDEX_MASK) as usize;
+        if status & FILL_LEVEL_MASK == 0 || index >= DEPTH {
+            return None;
+        }
+        // SAFETY: as in `receive`.
+        let at = unsafe { message_ram::read_tx_event(by, index) };
+        // SAFETY: acknowledges the event that has just been read.
+        registers.txefa().write(|w| unsafe { w.bits(index as u32) });
+        Some(at)
+    }
+
     /// The error state.
-    pub fn error_state(&self) -> ErrorState {
-        let status = registers().psr().read();
+    pub fn error_state(&self, of: Controller) -> ErrorState {
+        let status = registers(of).psr().read();
         if status.bo().bit_is_set() {
             ErrorState::BusOff
         } else if status.ep().bit_is_set() {
@@ -257,10 +321,9 @@ impl Rx {
             ErrorState::Active
         }
     }
-
-    /// The transmit and the receive error counter.
-    pub fn error_counters(&self) -> (u8, u8) {
-        let counters = registers().ecr().read();
-        (counters.tec().bits(), counters.rec().bits())
-    }
 }
+
+/// Fields of RXF0S, RXF1S and TXEFS.
+const FILL_LEVEL_MASK: u32 = 0b1111;
+const GET_INDEX_SHIFT: u32 = 8;
+const GET_INDEX_MASK: u32 = 0b11;

@@ -1,7 +1,7 @@
 //! The NUCLEO-G474RE (STM32G474RE, 24 MHz crystal) as a CAN master uses it.
 //!
 //! [`setup`] consumes the peripherals once and hands back configured devices:
-//! clocks at 170 MHz, FDCAN1 on PA11/PA12, a period timer with a compare, a
+//! clocks at 170 MHz, FDCAN1 on PA11/PA12, FDCAN2 on PB12/PB13, FDCAN3 on PA8/PA15, a period timer with a compare, a
 //! millisecond tick, a microsecond clock, two LEDs, the button, the watchdog,
 //! the second bank of the flash as storage, and what caused the last reset.
 //!
@@ -26,7 +26,14 @@ mod message_ram;
 pub use serial_number::serial_number;
 pub use stm32g4xx_hal::pac;
 
-use stm32g4xx_hal::{gpio::GpioExt, pwr::PwrExt, rcc::RccExt};
+use can::Controller;
+use pins::uses;
+use stm32g4xx_hal::{
+    can::CanExt,
+    gpio::GpioExt,
+    pwr::PwrExt,
+    rcc::{Enable, RccExt},
+};
 
 /// How fast the core and the timers run.
 pub const CORE_HZ: u32 = 170_000_000;
@@ -42,19 +49,15 @@ pub struct Config {
     /// After how long without [`watchdog::Watchdog::feed`] the board resets,
     /// in milliseconds, 1..=500.
     pub watchdog_ms: u32,
-    /// How the CAN controller makes a bit.
-    pub bit_timing: can::BitTiming,
-    /// What the CAN controller receives: at most
-    /// [`can::FILTERS`] ranges, the index of the first that matches comes with
-    /// each frame.
-    pub filters: &'static [can::RangeFilter],
+    /// FDCAN1, 2 and 3. Those that `setup` is not for are not looked at.
+    pub can: [can::Settings; 3],
 }
 
 /// The board, ready to be used.
 pub struct Devices {
     /// Why the board started.
     pub reset_cause: reset_cause::ResetCause,
-    /// Sends.
+    /// Sends, by all controllers.
     pub can_tx: can::Tx,
     /// Receives and tells what the controller has to report.
     pub can_rx: can::Rx,
@@ -64,6 +67,8 @@ pub struct Devices {
     pub deadline: timers::Deadline,
     /// Changes the period of both.
     pub sync_period: timers::SyncPeriod,
+    /// TIM3's count.
+    pub phase: timers::Phase,
     /// TIM7: every millisecond.
     pub tick: timers::Tick,
     /// TIM5: free-running microseconds.
@@ -80,14 +85,15 @@ pub struct Devices {
     pub watchdog: watchdog::Watchdog,
 }
 
-/// Configures the board. The timers run on return; their interrupts come as
+/// Configures the board with the CAN controllers that the bits of `CAN` stand for,
+/// FDCAN1 being bit 0. The timers run on return; their interrupts come as
 /// soon as the interrupt controller lets them through.
 ///
 /// # Panics
 ///
 /// If `config` is outside the ranges that its fields state: a mistake of the
 /// firmware's author, found the first time that it runs.
-pub fn setup(peripherals: pac::Peripherals, config: &Config) -> Devices {
+pub fn setup<const CAN: u8>(peripherals: pac::Peripherals, config: &Config) -> Devices {
     // First of all, so that whatever hangs below ends in a reset, too.
     let watchdog = watchdog::start(peripherals.IWDG, &peripherals.DBGMCU, config.watchdog_ms);
 
@@ -97,19 +103,22 @@ pub fn setup(peripherals: pac::Peripherals, config: &Config) -> Devices {
     let mut rcc = rcc.freeze(clock::config(), power);
     rcc.clear_reset_reason();
 
-    let pins = pins::setup(
+    let pins = pins::setup::<CAN>(
         peripherals.GPIOA.split(&mut rcc),
         peripherals.GPIOB.split(&mut rcc),
         peripherals.GPIOC.split(&mut rcc),
     );
-    let (can_tx, can_rx) = can::setup(
-        peripherals.FDCAN1,
-        pins.can_tx,
-        pins.can_rx,
-        &mut rcc,
-        config.bit_timing,
-        config.filters,
-    );
+    let [first, second, third] = &config.can;
+    pac::FDCAN1::enable(&mut rcc);
+    if uses(CAN, 0) {
+        can::setup(peripherals.FDCAN1.fdcan_unchecked(), Controller::FDCAN1, first);
+    }
+    if uses(CAN, 1) {
+        can::setup(peripherals.FDCAN2.fdcan_unchecked(), Controller::FDCAN2, second);
+    }
+    if uses(CAN, 2) {
+        can::setup(peripherals.FDCAN3.fdcan_unchecked(), Controller::FDCAN3, third);
+    }
     let timers = timers::setup(
         timers::Peripherals {
             tim2: peripherals.TIM2,
@@ -123,11 +132,12 @@ pub fn setup(peripherals: pac::Peripherals, config: &Config) -> Devices {
     );
     Devices {
         reset_cause,
-        can_tx,
-        can_rx,
+        can_tx: can::Tx::new(),
+        can_rx: can::Rx::new(),
         period: timers.period,
         deadline: timers.deadline,
         sync_period: timers.sync_period,
+        phase: timers.phase,
         tick: timers.tick,
         microseconds: timers.microseconds,
         run_led: pins.run_led,

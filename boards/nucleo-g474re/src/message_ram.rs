@@ -1,10 +1,14 @@
-//! FDCAN1's message RAM (RM0440, 44.3.3): layout and element formats.
+//! The controllers' message RAM (RM0440, 44.3.3): layout and element formats.
 
-use crate::can::{Element, Fifo, RangeFilter, RxElement};
+use crate::can::{Controller, Element, Fifo, RangeFilter, RxElement};
 
 const BASE: usize = 0x4000_A400;
+/// Bytes of each controller.
+const SIZE: usize = 0x350;
 const RX_FIFO_0: usize = 0x0B0;
 const RX_FIFO_1: usize = 0x188;
+const TX_EVENTS: usize = 0x260;
+const TX_EVENT_WORDS: usize = 2;
 const TX_BUFFERS: usize = 0x278;
 const WORD: usize = 4;
 const ELEMENT_WORDS: usize = 18;
@@ -17,6 +21,11 @@ const FILTER_STORE_IN_FIFO_0: u32 = 0b001 << 27;
 const FILTER_STORE_IN_FIFO_1: u32 = 0b010 << 27;
 const FILTER_ID1_SHIFT: u32 = 16;
 
+#[inline(always)]
+const fn base(of: Controller) -> usize {
+    BASE + of.index() * SIZE
+}
+
 /// Writes the standard filter `index` as a range filter (type 00).
 ///
 /// By hand, because fdcan 0.2.1 writes the bounds of a range in the wrong order
@@ -24,30 +33,30 @@ const FILTER_ID1_SHIFT: u32 = 16;
 ///
 /// # Safety
 ///
-/// FDCAN1's clock must be on, `index` below 28, and nobody else may access that
+/// The controllers' clock must be on, `index` below 28, and nobody else may access that
 /// filter element.
-pub(crate) unsafe fn write_filter(index: usize, filter: &RangeFilter) {
+pub(crate) unsafe fn write_filter(of: Controller, index: usize, filter: &RangeFilter) {
     let action = match filter.fifo {
         Fifo::Fifo0 => FILTER_STORE_IN_FIFO_0,
         Fifo::Fifo1 => FILTER_STORE_IN_FIFO_1,
     };
     let word = action | u32::from(filter.first) << FILTER_ID1_SHIFT | u32::from(filter.last);
-    // SAFETY: in FDCAN1's message RAM by the caller's promise on `index`;
-    // aligned, since BASE and the offset are multiples of four.
-    unsafe { ((BASE + index * WORD) as *mut u32).write_volatile(word) }
+    // SAFETY: in the message RAM by the caller's promise on `index`;
+    // aligned, since base and offset are multiples of four.
+    unsafe { ((base(of) + index * WORD) as *mut u32).write_volatile(word) }
 }
 
 /// Writes the Tx buffer `index`.
 ///
 /// # Safety
 ///
-/// FDCAN1's clock must be on, `index` below 3, no transmission of that buffer
+/// The controllers' clock must be on, `index` below 3, no transmission of that buffer
 /// may be requested, and nobody else may write Tx buffers meanwhile.
 #[inline(always)]
-pub(crate) unsafe fn write_tx(index: usize, element: &Element) {
-    let address = (BASE + TX_BUFFERS + index * ELEMENT_WORDS * WORD) as *mut u32;
+pub(crate) unsafe fn write_tx(of: Controller, index: usize, element: &Element) {
+    let address = (base(of) + TX_BUFFERS + index * ELEMENT_WORDS * WORD) as *mut u32;
     let words = element.words();
-    // SAFETY: in FDCAN1's message RAM by the caller's promise on `index`;
+    // SAFETY: in the message RAM by the caller's promise on `index`;
     // aligned.
     unsafe {
         address.write_volatile(words[0]);
@@ -64,16 +73,16 @@ pub(crate) unsafe fn write_tx(index: usize, element: &Element) {
 ///
 /// # Safety
 ///
-/// FDCAN1's clock must be on, `index` below 3, and the element must hold a
+/// The controllers' clock must be on, `index` below 3, and the element must hold a
 /// frame that is not yet acknowledged.
 #[inline(always)]
-pub(crate) unsafe fn read_rx(fifo: Fifo, index: usize) -> RxElement {
-    let base = match fifo {
+pub(crate) unsafe fn read_rx(of: Controller, fifo: Fifo, index: usize) -> RxElement {
+    let first = match fifo {
         Fifo::Fifo0 => RX_FIFO_0,
         Fifo::Fifo1 => RX_FIFO_1,
     };
-    let address = (BASE + base + index * ELEMENT_WORDS * WORD) as *const u32;
-    // SAFETY: in FDCAN1's message RAM by the caller's promise on `index`;
+    let address = (base(of) + first + index * ELEMENT_WORDS * WORD) as *const u32;
+    // SAFETY: in the message RAM by the caller's promise on `index`;
     // aligned; the controller writes no element before it is acknowledged.
     let words: [u32; USED_WORDS] = unsafe {
         [
@@ -84,4 +93,16 @@ pub(crate) unsafe fn read_rx(fifo: Fifo, index: usize) -> RxElement {
         ]
     };
     RxElement::new(words)
+}
+
+/// Reads the time stamp of the Tx event `index`.
+///
+/// # Safety
+///
+/// As [`read_rx`].
+#[inline(always)]
+pub(crate) unsafe fn read_tx_event(of: Controller, index: usize) -> u16 {
+    let address = (base(of) + TX_EVENTS + index * TX_EVENT_WORDS * WORD) as *const u32;
+    // SAFETY: in the message RAM by the caller's promise on `index`; aligned.
+    unsafe { address.add(1).read_volatile() as u16 }
 }

@@ -46,6 +46,28 @@ impl Deadline {
     }
 }
 
+/// Where in the period it is, by TIM3. May be copied: it only reads.
+#[derive(Clone, Copy)]
+pub struct Phase(());
+
+impl Phase {
+    /// Microseconds since the period began.
+    #[inline(always)]
+    pub fn elapsed_us(self) -> u32 {
+        // SAFETY: reading the counter has no effect on it. A `Phase` exists only
+        // after TIM3's clock was switched on.
+        unsafe { (*pac::TIM3::ptr()).cnt().read().bits() }
+    }
+
+    /// Microseconds until it ends.
+    #[inline(always)]
+    pub fn left_us(self) -> u32 {
+        // SAFETY: as above.
+        let last = unsafe { (*pac::TIM3::ptr()).arr().read().bits() };
+        (last + 1).saturating_sub(self.elapsed_us())
+    }
+}
+
 /// Changes the period of [`Period`] and [`Deadline`] together.
 pub struct SyncPeriod(());
 
@@ -119,6 +141,7 @@ pub(crate) struct Timers {
     pub(crate) period: Period,
     pub(crate) deadline: Deadline,
     pub(crate) sync_period: SyncPeriod,
+    pub(crate) phase: Phase,
     pub(crate) tick: Tick,
     pub(crate) microseconds: Microseconds,
 }
@@ -182,6 +205,7 @@ pub(crate) fn setup(p: Peripherals, rcc: &mut Rcc, period_us: u16, deadline_us: 
         period: Period(p.tim2),
         deadline: Deadline(p.tim3),
         sync_period: SyncPeriod(()),
+        phase: Phase(()),
         tick: Tick(p.tim7),
         microseconds: Microseconds(()),
     }

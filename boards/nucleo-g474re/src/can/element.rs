@@ -1,12 +1,14 @@
 //! Frames as the message RAM holds them (RM0440, 44.3.4 and 44.3.5).
 
 use crate::message_ram::USED_WORDS;
-use embedded_can::{Frame, Id, StandardId};
+use embedded_can::{Frame, StandardId};
 
 const REMOTE: u32 = 1 << 29;
 const EXTENDED: u32 = 1 << 30;
 const STANDARD_SHIFT: u32 = 18;
 const STANDARD_MASK: u32 = 0x7FF;
+/// EFC: store an event.
+const EVENT: u32 = 1 << 23;
 const DLC_SHIFT: u32 = 16;
 const DLC_MASK: u32 = 0xF;
 const DATA_MAX: usize = 8;
@@ -18,38 +20,29 @@ const FILTER_MASK: u32 = 0x7F;
 pub struct Element([u32; USED_WORDS]);
 
 impl Element {
-    /// `None` for an extended identifier or more than eight bytes of data.
-    pub fn new(frame: &impl Frame) -> Option<Element> {
-        let Id::Standard(id) = frame.id() else {
-            return None;
-        };
-        let dlc = frame.dlc();
-        if dlc > DATA_MAX {
-            return None;
-        }
-        let mut bytes = [0; DATA_MAX];
-        let remote = if frame.is_remote_frame() {
-            REMOTE
-        } else {
-            // Byte by byte: a call of memcpy is longer than this loop.
-            for (to, from) in bytes.iter_mut().zip(frame.data()) {
-                *to = *from;
-            }
-            0
-        };
-        let [a, b, c, d, e, f, g, h] = bytes;
-        Some(Element([
-            remote | u32::from(id.as_raw()) << STANDARD_SHIFT,
-            (dlc as u32) << DLC_SHIFT,
+    /// A frame with `dlc` bytes, at most eight, of `data`.
+    #[inline(always)]
+    pub fn new(id: StandardId, remote: bool, dlc: u8, data: [u8; DATA_MAX]) -> Element {
+        let [a, b, c, d, e, f, g, h] = data;
+        let remote = if remote { REMOTE } else { 0 };
+        Element([
+            remote | (id.as_raw() as u32) << STANDARD_SHIFT,
+            (dlc as u32 & DLC_MASK) << DLC_SHIFT,
             u32::from_le_bytes([a, b, c, d]),
             u32::from_le_bytes([e, f, g, h]),
-        ]))
+        ])
+    }
+
+    /// The same, and when it is sent the controller is to tell when it began.
+    pub const fn with_event(self) -> Element {
+        let [id, control, low, high] = self.0;
+        Element([id, control | EVENT, low, high])
     }
 
     /// From now on `data` is the only byte, or there is none.
     #[inline(always)]
     pub fn set_byte(&mut self, data: Option<u8>) {
-        self.0[1] = u32::from(data.is_some()) << DLC_SHIFT;
+        self.0[1] = self.0[1] & EVENT | u32::from(data.is_some()) << DLC_SHIFT;
         self.0[2] = u32::from(data.unwrap_or_default());
     }
 
@@ -62,7 +55,7 @@ impl Element {
     }
 
     pub(crate) const fn has_data(&self) -> bool {
-        self.0[1] != 0
+        self.0[1] & !EVENT != 0
     }
 }
 

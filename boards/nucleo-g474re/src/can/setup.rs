@@ -1,18 +1,14 @@
 //! Configuration: bit timing, filters, interrupts.
 
-use super::{FILTERS, RangeFilter, Rx, Tx, registers};
+use super::{Controller, FILTERS, RangeFilter, Rx, Tx, registers};
 use crate::message_ram::{self, DEPTH};
 use core::num::{NonZeroU8, NonZeroU16};
 use fdcan::{
+    ConfigMode, FdCan,
     config::{FdCanConfig, FrameTransmissionConfig, GlobalFilter, NominalBitTiming},
     interrupt::Interrupts,
 };
-use stm32g4xx_hal::{
-    can::CanExt,
-    gpio::{AF9, PA11, PA12},
-    pac,
-    rcc::Rcc,
-};
+use stm32g4xx_hal::pac::fdcan::RegisterBlock;
 
 /// How the controller makes a bit of its clock, the 24 MHz of the crystal. The
 /// jump width is all of segment 2: the wider, the more clock error between the
@@ -48,30 +44,49 @@ impl BitTiming {
 const PRESCALER_MAX: u16 = 512;
 const SEG2_MAX: u16 = 128;
 
+/// What a controller is told.
+#[derive(Clone, Copy)]
+pub struct Settings {
+    /// How it makes a bit.
+    pub timing: BitTiming,
+    /// What it receives: at most [`FILTERS`] ranges, the index of the first that
+    /// matches comes with each frame.
+    pub filters: &'static [RangeFilter],
+}
+
+impl Tx {
+    pub(crate) const fn new() -> Tx {
+        Tx { _only: () }
+    }
+}
+
+impl Rx {
+    pub(crate) const fn new() -> Rx {
+        Rx { _only: () }
+    }
+}
+
 /// # Panics
 ///
 /// If there are more than [`FILTERS`] filters, or the controller is not the
 /// one that is expected.
-pub(crate) fn setup(
-    peripheral: pac::FDCAN1,
-    tx: PA12<AF9>,
-    rx: PA11<AF9>,
-    rcc: &mut Rcc,
-    timing: BitTiming,
-    filters: &[RangeFilter],
-) -> (Tx, Rx) {
+pub(crate) fn setup<I: fdcan::Instance>(
+    mut can: FdCan<I, ConfigMode>,
+    controller: Controller,
+    settings: &Settings,
+) {
+    let filters = settings.filters;
     assert!(filters.len() <= FILTERS);
-    let mut can = peripheral.fdcan(tx, rx, rcc);
     can.apply_config(
         FdCanConfig::default()
-            .set_nominal_bit_timing(timing.0)
+            .set_nominal_bit_timing(settings.timing.0)
             .set_frame_transmit(FrameTransmissionConfig::ClassicCanOnly)
             .set_global_filter(GlobalFilter::reject_all()),
     );
     for (index, filter) in filters.iter().enumerate() {
-        // SAFETY: the clock is on since `fdcan`; the number of filters was
-        // checked; the controller does not run yet.
-        unsafe { message_ram::write_filter(index, filter) };
+        // SAFETY: the clock is on since the controller was taken; the number of
+        // filters was checked; the controller does not run yet.
+        unsafe { message_ram::write_filter(controller, index, filter) };
     }
     can.enable_interrupts(
         Interrupts::RX_FIFO0_NEW_MSG
@@ -83,28 +98,30 @@ pub(crate) fn setup(
             | Interrupts::WARNING_STATUS
             | Interrupts::BUS_OFF,
     );
+    let registers = registers(controller);
     // The completion of any of the three buffers raises TX_COMPLETE.
     // SAFETY: the enable bits of the three buffers.
-    registers()
+    registers
         .txbtie()
         .write(|w| unsafe { w.bits((1 << DEPTH) - 1) });
     // Line 0, by register: the crate has the two enable bits swapped. ILS was
     // left 0 above, which routes every group there.
-    registers().ile().write(|w| w.eint0().set_bit());
-    start();
-    (
-        Tx {
-            identifiers: [0; DEPTH],
-        },
-        Rx { _configured: can },
-    )
+    registers.ile().write(|w| w.eint0().set_bit());
+    // Time stamps are TIM3's count: the microseconds of the period.
+    // SAFETY: one of the three sources.
+    registers
+        .tscc()
+        .write(|w| unsafe { w.bits(TIME_STAMPS_BY_TIM3) });
+    start(registers);
 }
+
+const TIME_STAMPS_BY_TIM3: u32 = 0b10;
 
 /// Leaves configuration mode. Not by the crate's `into_normal`: that applies the
 /// configuration anew from a copy that lacks the global filter, and every frame
 /// that no filter wants, extended and remote ones too, would end in FIFO 0.
-fn start() {
-    let control = registers().cccr();
+fn start(registers: &RegisterBlock) {
+    let control = registers.cccr();
     control.modify(|_, w| w.cce().clear_bit());
     control.modify(|_, w| w.init().clear_bit());
     while control.read().init().bit_is_set() {}

@@ -1,0 +1,308 @@
+//! What waits to be sent on each bus, and when it may be.
+//!
+//! A cycle is laid out (`network.toml`): SYNC, the TPDOs, the burst of RPDOs, and
+//! a number of planned frames, which is everything else that the master sends. The
+//! planned ones have a window after the SYNC; an SDO request has one of its own,
+//! so that its answer comes where there is room for it. Before the end of the
+//! cycle nothing is begun that could still be on the wire when the next SYNC is
+//! due. While no SYNC is produced all may go at any time.
+
+use crate::{
+    counters,
+    derived::{
+        self, AXES, AXIS_BUSES, BUSES, CONTROLLERS, EARLY, FRAME_US, GUARD_US, NETWORK,
+        ONE_PLANNED,
+    },
+};
+use canmaster::{
+    Frame,
+    id::{CobId, FunctionCode},
+    master::{Burst, Pending, Put, TPDOS_PER_AXIS, TxQueue, holds, room},
+    sync::SyncCounter,
+};
+use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering::Relaxed};
+use nucleo_g474re::{can, pac::Interrupt, timers::Phase};
+use rtic::Mutex;
+
+/// 1005h, bit 30: the master produces SYNC.
+pub(crate) static PRODUCING: AtomicBool = AtomicBool::new(false);
+/// SYNCs since the start.
+pub(crate) static SYNCS: AtomicU32 = AtomicU32::new(0);
+/// The bus on which a client spoke to the board last.
+static CLIENT: AtomicU8 = AtomicU8::new(0);
+
+/// What sends, with the frame that `sync_tick` sends.
+#[expect(unreachable_pub, reason = "RTIC wants shared resources to be public")]
+pub struct Sender {
+    pub(crate) tx: can::Tx,
+    pub(crate) sync: can::Element,
+    /// 1019h.
+    pub(crate) counter: SyncCounter,
+}
+
+impl Sender {
+    /// Requests the SYNC on every bus.
+    #[inline(always)]
+    pub(crate) fn sync(&mut self) {
+        self.sync.set_byte(self.counter.count());
+        for controller in CONTROLLERS {
+            let waits = holds(&can::pending(controller), CobId::SYNC);
+            if waits || self.tx.transmit(controller, &self.sync).is_err() {
+                counters::SYNC_NOT_SENT.add(1);
+            }
+        }
+    }
+}
+
+/// What waits to be sent on one bus.
+#[expect(unreachable_pub, reason = "RTIC wants shared resources to be public")]
+pub struct Line {
+    /// RPDOs of every cycle that go after the TPDOs of their own cycle.
+    burst: Burst<{ TPDOS_PER_AXIS * AXES }>,
+    /// RPDOs of every cycle that wait for the next SYNC.
+    early: Burst<{ if EARLY { TPDOS_PER_AXIS * AXES } else { 1 } }>,
+    /// The SYNC after whose TPDOs they were made.
+    made_after: u32,
+    /// Everything else.
+    pub(crate) planned: TxQueue<{ derived::TX_QUEUE }>,
+    /// The cycle that `left` is for.
+    cycle: u32,
+    /// How many planned frames may still go in it.
+    left: u8,
+}
+
+/// All buses.
+#[expect(unreachable_pub, reason = "RTIC wants shared resources to be public")]
+pub type Lines = [Line; BUSES];
+
+impl Line {
+    pub(crate) const fn new() -> Line {
+        Line {
+            burst: Burst::new(),
+            early: Burst::new(),
+            made_after: 0,
+            planned: TxQueue::new(),
+            cycle: 0,
+            left: 0,
+        }
+    }
+
+    /// Takes the RPDOs of another cycle. Those that were not sent are counted.
+    pub(crate) fn begin(&mut self, sync: u32) {
+        self.drop_late();
+        if EARLY {
+            counters::RPDO_REPLACED.add(self.early.begin() as u32);
+        }
+        self.made_after = sync;
+    }
+
+    fn drop_late(&mut self) {
+        counters::RPDO_REPLACED.add(self.burst.begin() as u32);
+    }
+
+    /// An RPDO of every cycle, to be sent in its own or after the next SYNC.
+    pub(crate) fn cyclic(&mut self, frame: Frame, early: bool) {
+        if EARLY && early {
+            self.early.put(frame);
+        } else {
+            self.burst.put(frame);
+        }
+    }
+
+    /// An RPDO on change.
+    pub(crate) fn on_change(&mut self, frame: Frame) {
+        if let Ok(Put::Replaced) = self.planned.put_latest(frame) {
+            counters::RPDO_REPLACED.add(1);
+        }
+    }
+
+    /// Drops all, after bus-off.
+    pub(crate) fn clear(&mut self) {
+        self.burst.begin();
+        self.early.begin();
+        self.planned.clear();
+    }
+
+    /// What is to be given to the controller next.
+    fn next(&mut self, bus: usize, pending: &Pending, phase: Phase) -> Option<Frame> {
+        let waits = !self.planned.is_empty();
+        if !PRODUCING.load(Relaxed) {
+            let planned = self.planned.next(pending);
+            return planned.or_else(|| self.next_rpdo(pending));
+        }
+        if phase.left_us() < GUARD_US + FRAME_US {
+            return None;
+        }
+        let syncs = SYNCS.load(Relaxed);
+        if waits && let Some(frame) = self.next_planned(bus, pending, syncs, phase) {
+            return Some(frame);
+        }
+        if self.made_after == syncs {
+            return self.burst.next(pending);
+        }
+        // Made too late for its own cycle, nothing is sent in the next.
+        self.drop_late();
+        if EARLY { self.early.next(pending) } else { None }
+    }
+
+    #[inline(always)]
+    fn is_empty(&self) -> bool {
+        self.planned.is_empty() && self.rpdos_are_sent()
+    }
+
+    #[inline(always)]
+    fn rpdos_are_sent(&self) -> bool {
+        self.burst.is_over() && (!EARLY || self.early.is_over())
+    }
+
+    fn next_rpdo(&mut self, pending: &Pending) -> Option<Frame> {
+        let early = if EARLY { self.early.next(pending) } else { None };
+        early.or_else(|| self.burst.next(pending))
+    }
+
+    #[inline(never)]
+    fn next_planned(
+        &mut self,
+        bus: usize,
+        pending: &Pending,
+        syncs: u32,
+        phase: Phase,
+    ) -> Option<Frame> {
+        if self.cycle != syncs {
+            self.cycle = syncs;
+            self.left = match ONE_PLANNED.get(bus) {
+                Some(true) => 1,
+                _ => u8::MAX,
+            };
+        }
+        if self.left == 0 {
+            return None;
+        }
+        let us = phase.elapsed_us() as u16;
+        let free = self.left > 1;
+        let (from, until) = *derived::SDO_US.get(bus)?;
+        let sdo = free || (from <= us && us < until && self.rpdos_are_sent());
+        let others = free || us < *derived::AFTER_SYNC_US.get(bus)?;
+        let next = self.planned.next_of(pending, |id| match id.split() {
+            Some((FunctionCode::SdoRequest | FunctionCode::SdoResponse, _)) => sdo,
+            _ => others,
+        });
+        if next.is_some() && !free {
+            self.left = 0;
+        }
+        next
+    }
+}
+
+/// Gives the controller of a bus what it has room for.
+#[inline(always)]
+pub(crate) fn refill(
+    bus: usize,
+    lines: &mut impl Mutex<T = Lines>,
+    sender: &mut impl Mutex<T = Sender>,
+    phase: Phase,
+) {
+    let Some(&controller) = CONTROLLERS.get(bus) else {
+        return;
+    };
+    if lines.lock(|lines| lines.get(bus).is_none_or(Line::is_empty)) {
+        return;
+    }
+    let mut pending = can::pending(controller);
+    for _ in 0..room(&pending) {
+        let next = lines.lock(|lines| lines.get_mut(bus)?.next(bus, &pending, phase));
+        let Some(frame) = next else {
+            break;
+        };
+        // The frame is made ready before the SYNC is held off.
+        let element = element(&frame);
+        // Two other frames at most were pending, and a SYNC: there is room.
+        if sender
+            .lock(|sender| sender.tx.transmit(controller, &element))
+            .is_err()
+        {
+            counters::RPDO_REPLACED.add(1);
+        }
+        for place in &mut pending {
+            if *place == can::FREE {
+                *place = frame.id().get();
+                break;
+            }
+        }
+    }
+}
+
+/// The frame as the controller wants it.
+#[inline(always)]
+pub(crate) fn element(frame: &Frame) -> can::Element {
+    let id = frame.id().into();
+    can::Element::new(id, frame.is_remote(), frame.dlc(), frame.padded())
+}
+
+/// Has the controllers look for something to send.
+#[inline(always)]
+pub(crate) fn send_now() {
+    for interrupt in INTERRUPTS {
+        rtic::pend(interrupt);
+    }
+}
+
+/// Of each bus.
+const INTERRUPTS: [Interrupt; BUSES] = {
+    let mut all = [Interrupt::FDCAN1_IT0; BUSES];
+    let mut bus = 0;
+    while bus < BUSES {
+        all[bus] = match derived::BUS_PERIPHERALS[bus] {
+            2 => Interrupt::FDCAN2_IT0,
+            3 => Interrupt::FDCAN3_IT0,
+            _ => Interrupt::FDCAN1_IT0,
+        };
+        bus += 1;
+    }
+    all
+};
+
+/// The bus on which a frame is sent; `None`: all.
+fn bus_of(id: CobId) -> Option<usize> {
+    if BUSES == 1 {
+        return None;
+    }
+    let (_, node) = id.split()?;
+    if node == NETWORK.master.node {
+        // Its heartbeat and its emergencies are for everybody.
+        let answer = id == CobId::of(FunctionCode::SdoResponse, node);
+        return answer.then(|| CLIENT.load(Relaxed).into());
+    }
+    let (axis, _) = NETWORK.find(node)?;
+    AXIS_BUSES.get(axis).map(|bus| usize::from(*bus))
+}
+
+/// A client on this bus has spoken to the board.
+#[inline(always)]
+pub(crate) fn client_on(bus: usize) {
+    if BUSES > 1 {
+        CLIENT.store(bus as u8, Relaxed);
+    }
+}
+
+/// Queues a planned frame on its bus, or on all, and has it sent. A full queue
+/// counts it. `limit`: only where fewer wait. Whether it was queued.
+pub(crate) fn send(lines: &mut impl Mutex<T = Lines>, frame: Frame, limit: usize) -> bool {
+    let to = bus_of(frame.id());
+    let sent = lines.lock(|lines| {
+        let mut sent = false;
+        for (bus, line) in lines.iter_mut().enumerate() {
+            if to.is_none_or(|to| to == bus) && line.planned.len() < limit {
+                sent |= line.planned.put(frame).is_ok();
+            }
+        }
+        sent
+    });
+    send_now();
+    sent
+}
+
+/// Whether fewer than `limit` frames wait on every bus.
+pub(crate) fn have_room(lines: &mut impl Mutex<T = Lines>, limit: usize) -> bool {
+    lines.lock(|lines| lines.iter().all(|line| line.planned.len() < limit))
+}
