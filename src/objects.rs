@@ -5,6 +5,8 @@ use crate::id::Address;
 
 /// Device type (CiA 301, 7.5.2.1), U32.
 pub const DEVICE_TYPE: Address = Address::new(0x1000, 0);
+/// Error register (CiA 301, 7.5.2.2), U8.
+pub const ERROR_REGISTER: Address = Address::new(0x1001, 0);
 /// COB-ID SYNC (CiA 301, 7.5.2.5), U32; bit 30: the device produces SYNC.
 pub const COB_ID_SYNC: Address = Address::new(0x1005, 0);
 /// Communication cycle period (CiA 301, 7.5.2.6), U32 in microseconds.

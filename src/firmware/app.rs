@@ -21,6 +21,7 @@
 #[rtic::app(device = nucleo_g474re::pac, peripherals = true, dispatchers = [UART4])]
 mod app {
     use crate::{
+        asking::Asking,
         axes::Axes,
         configurator::Configurator,
         control::Control,
@@ -49,9 +50,7 @@ mod app {
     };
     use core::{mem::MaybeUninit, sync::atomic::Ordering};
     use heapless::spsc::{Consumer, Producer, Queue};
-    use nucleo_g474re::{
-        Config, can, pins, reset_cause::ResetCause, timers, watchdog::Watchdog,
-    };
+    use nucleo_g474re::{Config, can, pins, reset_cause::ResetCause, timers, watchdog::Watchdog};
 
     type FrameQueue = Queue<Frame, { design::rx_queue(AXES) }>;
     type NewsQueue = Queue<News, { design::log_queue(AXES) }>;
@@ -95,6 +94,7 @@ mod app {
         heartbeat_time: Duration,
         orders: Consumer<'static, Order>,
         counts: Counts,
+        asking: Asking,
         known_bus: can::ErrorState,
         reset_cause: ResetCause,
         clock: timers::Microseconds,
@@ -138,6 +138,7 @@ mod app {
             &Config {
                 period_us: cycle_us,
                 deadline_us: derived::TPDO_DEADLINE_US,
+                second_us: derived::WINDOW_US,
                 watchdog_ms: design::WATCHDOG_MS,
                 can: [settings(1), settings(2), settings(3)],
             },
@@ -198,6 +199,7 @@ mod app {
                 heartbeat_time: NETWORK.master.heartbeat,
                 orders,
                 counts: Counts::default(),
+                asking: Asking::default(),
                 known_bus: can::ErrorState::Active,
                 reset_cause: board.reset_cause,
                 clock: board.microseconds,
@@ -333,6 +335,9 @@ mod app {
         shared = [od, lines, control, commands]
     )]
     fn pdo_producer(mut cx: pdo_producer::Context) {
+        if derived::WINDOW_US != 0 && cx.local.deadline.take_second() {
+            lines::send_now();
+        }
         let deadline = cx.local.deadline.take();
         if deadline {
             // Once per period, whatever else pends the task.
@@ -387,7 +392,7 @@ mod app {
         local = [
             tick, microseconds, milliseconds, run_led, error_led, button, debounce, watchdog,
             from_can, states_to, news_to, supervisor, heartbeat, heartbeat_time,
-            orders, counts, known_bus,
+            orders, counts, known_bus, asking,
         ],
         shared = [od, lines, control, states]
     )]
@@ -445,6 +450,11 @@ mod app {
             && !control.bus_off
         {
             lines::send(&mut cx.shared.lines, frame, usize::MAX);
+        }
+        if control.leads() && !control.bus_off {
+            local
+                .asking
+                .go_on(control.operational, &mut cx.shared.lines);
         }
         if local.milliseconds.is_multiple_of(design::LED_MS) {
             let lost = local.supervisor.any_lost();

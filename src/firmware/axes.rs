@@ -47,11 +47,7 @@ impl Axes {
     }
 
     /// Takes in the TPDOs of a cycle.
-    pub(crate) fn read(
-        &mut self,
-        cycle: &Cycle,
-        od: &mut impl Mutex<T = MasterOd<AXES>>,
-    ) {
+    pub(crate) fn read(&mut self, cycle: &Cycle, od: &mut impl Mutex<T = MasterOd<AXES>>) {
         let axes = self.feedback.iter_mut().zip(&mut self.speed);
         for (axis, ((feedback, speed), pdos)) in axes.zip(&PDOS).enumerate() {
             let (Some(first), Some(second)) = (TpdoSlot::new(axis, 0), TpdoSlot::new(axis, 1))

@@ -34,6 +34,8 @@ pub(crate) static RX_OVERRUNS: Counter = Counter::new();
 pub(crate) static RX_QUEUE_FULL: Counter = Counter::new();
 /// TPDOs shorter than mapped.
 pub(crate) static TPDO_LENGTH: Counter = Counter::new();
+/// Answers to the background's SDO requests.
+pub(crate) static ANSWERS: Counter = Counter::new();
 
 /// Lines that found the queue to the log full.
 pub(crate) static LOG_FULL: Counter = Counter::new();

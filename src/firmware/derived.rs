@@ -14,25 +14,22 @@ mod generated {
     include!(concat!(env!("OUT_DIR"), "/network.rs"));
 }
 
-pub(crate) use generated::{AXES, NETWORK, RPDOS_US, TPDO_DEADLINE_US};
-
-pub(crate) const BUSES: usize = 1;
-pub(crate) const BUS_PERIPHERALS: [u8; BUSES] = [1];
-pub(crate) const AXIS_BUSES: [u8; AXES] = [0; AXES];
-const BUS_BIT_TIMINGS: [(u16, u16, u16); BUSES] = [generated::BIT_TIMING];
-pub(crate) const RPDOS_AFTER_SYNC: bool = false;
-pub(crate) const RAMPS_ON_CHANGE: [bool; AXES] = [true; AXES];
-pub(crate) const ONE_PLANNED: [bool; BUSES] = [NETWORK.cycle.as_micros() < 5000];
-pub(crate) const AFTER_SYNC_US: [u16; BUSES] = [50];
-const SDO_FROM_US: [u16; BUSES] = [0];
-const SDO_UNTIL_US: [u16; BUSES] = [50];
-const GENERATED_GUARD_US: u16 = 35;
+pub(crate) use generated::{
+    AFTER_SYNC_US, AXES, AXIS_BUSES, BUS_PERIPHERALS, BUSES, HEARTBEATS_IN_OPERATIONAL, NETWORK,
+    ONE_PLANNED, RAMPS_ON_CHANGE, RPDOS_AFTER_SYNC, RPDOS_US, SDO_EVERY, SDO_NEXT_CYCLE,
+    TPDO_DEADLINE_US,
+};
+use generated::{BUS_BIT_TIMINGS, SDO_FROM_US, SDO_UNTIL_US};
 
 /// Before the end of the cycle nothing is begun that could still be on the wire.
-pub(crate) const GUARD_US: u32 = GENERATED_GUARD_US as u32;
+pub(crate) const GUARD_US: u32 = generated::GUARD_US as u32;
 
-/// The longest frame.
-pub(crate) const FRAME_US: u32 = 135_000_000 / NETWORK.bit_rate;
+/// How long the longest frame takes.
+pub(crate) const FRAME_US: u32 = {
+    const LONGEST_BITS: u32 = 135;
+    const SECOND_US: u32 = 1_000_000;
+    LONGEST_BITS * SECOND_US / NETWORK.bit_rate
+};
 
 /// Whether any RPDO of every cycle waits for the next SYNC.
 pub(crate) const EARLY: bool = {
@@ -53,6 +50,19 @@ pub(crate) const SDO_US: [(u16, u16); BUSES] = {
         bus += 1;
     }
     all
+};
+
+/// When the first of the windows begins that is not open from the SYNC on, in
+/// microseconds after it; 0: there is none.
+pub(crate) const WINDOW_US: u16 = {
+    let (mut first, mut bus) = (0, 0);
+    while bus < BUSES {
+        if SDO_FROM_US[bus] > first {
+            first = SDO_FROM_US[bus];
+        }
+        bus += 1;
+    }
+    first
 };
 
 /// The controller of each bus.
@@ -96,41 +106,6 @@ pub(crate) const fn bit_timing(peripheral: u8) -> BitTiming {
         None => panic!("the controller has no such bit timing"),
     }
 }
-
-/// What a description may ask for and the firmware does not do is refused here.
-const _: () = {
-    let [controller] = generated::BUS_PERIPHERALS;
-    assert!(generated::BUSES == 1 && controller == 1, "it drives FDCAN1");
-    let [(prescaler, ..)] = generated::BUS_BIT_TIMINGS;
-    assert!(
-        prescaler == generated::BIT_TIMING.0,
-        "one bus, one bit timing"
-    );
-    let [bus, ..] = generated::AXIS_BUSES;
-    assert!(bus == 0, "all axes are on the first bus");
-    assert!(
-        !generated::RPDOS_AFTER_SYNC,
-        "it sends RPDOs after the TPDOs"
-    );
-    let ([false], [from], [until], [false], [0]) = (
-        generated::ONE_PLANNED,
-        generated::SDO_FROM_US,
-        generated::SDO_UNTIL_US,
-        generated::SDO_NEXT_CYCLE,
-        generated::SDO_EVERY,
-    ) else {
-        panic!("it does not plan SDO frames");
-    };
-    assert!(from <= until);
-    let [after_sync] = generated::AFTER_SYNC_US;
-    assert!(after_sync as u32 + generated::GUARD_US as u32 <= NETWORK.cycle.as_micros());
-    let [true, ..] = generated::RAMPS_ON_CHANGE else {
-        panic!("it sends ramps on change");
-    };
-    let [true, ..] = generated::HEARTBEATS_IN_OPERATIONAL else {
-        panic!("it lets heartbeats run");
-    };
-};
 
 /// Where in its PDOs each object of each axis lies.
 pub(crate) static PDOS: [AxisPdos; AXES] = match AxisPdos::of_all(&NETWORK) {

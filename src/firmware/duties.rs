@@ -3,6 +3,7 @@
 
 use crate::{
     app::app::NETWORK,
+    asking,
     configurator::Configurator,
     derived::{AXES, CONTROLLERS, RPDOS_US},
     lines::{self, Line, PRODUCING},
@@ -10,7 +11,7 @@ use crate::{
 };
 use canmaster::{
     Frame,
-    boot::{Action, NetworkBoot},
+    boot::{self, Action, NetworkBoot},
     design,
     device::{Event, Setting},
     motion::{FaultCause, GroupEvent, GroupState},
@@ -164,6 +165,11 @@ impl Configurator<'_> {
                 }
             }
             Action::Report(event) => {
+                if let boot::Event::Operational(node) | boot::Event::NodeBack(node) = event
+                    && let Some(frame) = asking::quieten(*node)
+                {
+                    self.send(frame);
+                }
                 self.local.own.boot(event);
                 self.shared.control.lock(|control| control.boot(event));
                 self.log.boot(event);

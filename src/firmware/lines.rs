@@ -11,7 +11,7 @@ use crate::{
     counters,
     derived::{
         self, AXES, AXIS_BUSES, BUSES, CONTROLLERS, EARLY, FRAME_US, GUARD_US, NETWORK,
-        ONE_PLANNED,
+        ONE_PLANNED, SDO_NEXT_CYCLE,
     },
 };
 use canmaster::{
@@ -142,7 +142,11 @@ impl Line {
         }
         // Made too late for its own cycle, nothing is sent in the next.
         self.drop_late();
-        if EARLY { self.early.next(pending) } else { None }
+        if EARLY {
+            self.early.next(pending)
+        } else {
+            None
+        }
     }
 
     #[inline(always)]
@@ -156,7 +160,11 @@ impl Line {
     }
 
     fn next_rpdo(&mut self, pending: &Pending) -> Option<Frame> {
-        let early = if EARLY { self.early.next(pending) } else { None };
+        let early = if EARLY {
+            self.early.next(pending)
+        } else {
+            None
+        };
         early.or_else(|| self.burst.next(pending))
     }
 
@@ -168,7 +176,7 @@ impl Line {
         syncs: u32,
         phase: Phase,
     ) -> Option<Frame> {
-        if self.cycle != syncs {
+        if syncs.wrapping_sub(self.cycle).cast_signed() > 0 {
             self.cycle = syncs;
             self.left = match ONE_PLANNED.get(bus) {
                 Some(true) => 1,
@@ -183,15 +191,27 @@ impl Line {
         let (from, until) = *derived::SDO_US.get(bus)?;
         let sdo = free || (from <= us && us < until && self.rpdos_are_sent());
         let others = free || us < *derived::AFTER_SYNC_US.get(bus)?;
-        let next = self.planned.next_of(pending, |id| match id.split() {
-            Some((FunctionCode::SdoRequest | FunctionCode::SdoResponse, _)) => sdo,
-            _ => others,
-        });
-        if next.is_some() && !free {
+        let may = |id| if is_sdo(id) { sdo } else { others };
+        let next = self.planned.next_of(pending, may);
+        if let Some(frame) = &next
+            && !free
+        {
             self.left = 0;
+            let answered_later = SDO_NEXT_CYCLE.get(bus).is_some_and(|later| *later);
+            if answered_later && is_sdo(frame.id()) {
+                self.cycle = syncs.wrapping_add(1);
+            }
         }
         next
     }
+}
+
+fn is_sdo(id: CobId) -> bool {
+    let function = id.split().map(|(function, _)| function);
+    matches!(
+        function,
+        Some(FunctionCode::SdoRequest | FunctionCode::SdoResponse)
+    )
 }
 
 /// Gives the controller of a bus what it has room for.

@@ -5,6 +5,8 @@
 #[cfg(target_os = "none")]
 mod app;
 #[cfg(target_os = "none")]
+mod asking;
+#[cfg(target_os = "none")]
 mod axes;
 #[cfg(target_os = "none")]
 mod configurator;

@@ -9,6 +9,7 @@
 //! too, are off. Reset node and reset communication both start the board anew.
 
 use crate::{
+    asking,
     control::Control,
     derived::{AXES, PDOS, SYNC_LIMITS},
     log::News,
@@ -362,9 +363,10 @@ impl OwnNode {
         match setting {
             Setting::ProducerHeartbeat => give(Order::Heartbeat(settings.heartbeat())),
             Setting::ConsumerHeartbeat(_) => {
-                for node in self.network.nodes {
-                    let time = settings.consumer_time(node.id).unwrap_or(Duration::ZERO);
-                    give(Order::Consumer(node.id, time));
+                for (axis, node) in self.network.nodes.iter().enumerate() {
+                    let time = settings.consumer_time(node.id);
+                    let time = time.filter(|_| asking::is_watched(axis));
+                    give(Order::Consumer(node.id, time.unwrap_or(Duration::ZERO)));
                 }
                 let mut consumers = settings.consumers();
                 give(Order::Watch(

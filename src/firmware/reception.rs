@@ -1,7 +1,7 @@
 //! What `can_irq` does with what it receives on one bus.
 
 use crate::{
-    counters,
+    asking, counters,
     derived::{AXES, BUSES, CONTROLLERS},
     filters::{self, Handler},
     lines::{self, Line, Lines, PRODUCING, SYNCS, Sender},
@@ -125,6 +125,7 @@ impl Receiver {
             return;
         };
         let to = match handler {
+            Handler::Answer if asking::is_answer(&frame) => return,
             Handler::Answer if transfer::wants(frame.id()) => &mut self.transfer_to,
             Handler::Answer => &mut self.answers_to,
             Handler::Request => {

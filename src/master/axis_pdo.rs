@@ -76,7 +76,9 @@ impl Place {
     /// The object and what follows it; 0 if it is not mapped.
     #[inline]
     fn read(self, image: &Image) -> u32 {
-        let bytes = image.get(usize::from(self.0)..).and_then(<[u8]>::first_chunk);
+        let bytes = image
+            .get(usize::from(self.0)..)
+            .and_then(<[u8]>::first_chunk);
         bytes.map_or(0, |bytes| u32::from_le_bytes(*bytes))
     }
 
@@ -346,8 +348,9 @@ mod tests {
         assert_eq!(AxisPdos::tpdo_bytes(&[pdos]), [[5, 7]]);
 
         assert!(pdos.has_velocity());
+        const NO_VELOCITY: &[Pdo] = &[pdo(1, &[STATUSWORD, POSITION])];
         let slow = AxisPdos::of(&Node {
-            tpdos: &[pdo(1, &[STATUSWORD, POSITION])],
+            tpdos: NO_VELOCITY,
             ..node
         });
         let slow = slow.unwrap();

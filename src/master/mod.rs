@@ -21,7 +21,9 @@ pub use axis_pdo::AxisPdos;
 pub use burst::Burst;
 pub use clock::ExtendedClock;
 pub use debounce::Debounce;
-pub use od::{Cycle, IMAGE_BYTES, MasterOd, Reception, TPDOS_PER_AXIS, TpdoSlot, TpdoSlots, WrongLength};
+pub use od::{
+    Cycle, IMAGE_BYTES, MasterOd, Reception, TPDOS_PER_AXIS, TpdoSlot, TpdoSlots, WrongLength,
+};
 pub use ramps::Ramps;
 pub use roll_call::RollCall;
 pub use supervisor::{Advice, Notice, Report, Supervisor};

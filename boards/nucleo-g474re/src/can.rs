@@ -9,8 +9,8 @@ mod element;
 mod setup;
 
 pub use element::{Element, RxElement};
-pub use setup::{BitTiming, Settings};
 pub(crate) use setup::setup;
+pub use setup::{BitTiming, Settings};
 
 use crate::message_ram::{self, DEPTH};
 use core::sync::atomic::{AtomicU16, Ordering::Relaxed};
@@ -111,8 +111,7 @@ pub struct Tx {
 #[inline(always)]
 pub fn pending(of: Controller) -> [u16; BUFFERS] {
     // A request shows in TXBRP only when the controller's scan is done.
-    let waiting =
-        registers(of).txbrp().read().bits() | registers(of).txbar().read().bits();
+    let waiting = registers(of).txbrp().read().bits() | registers(of).txbar().read().bits();
     let mut pending = [FREE; BUFFERS];
     let (Some(held), true) = (IDENTIFIERS.get(of.index()), waiting != 0) else {
         // The way of almost every SYNC.
@@ -154,7 +153,9 @@ impl Tx {
         // `&mut self` is the only way to Tx buffers.
         unsafe { message_ram::write_tx(by, index, element) };
         // SAFETY: a request bit of a buffer that has just been filled.
-        registers(by).txbar().write(|w| unsafe { w.bits(1 << index) });
+        registers(by)
+            .txbar()
+            .write(|w| unsafe { w.bits(1 << index) });
         Ok(())
     }
 
@@ -209,11 +210,8 @@ const FLAG_ERROR_WARNING: u32 = 1 << 18;
 const FLAG_BUS_OFF: u32 = 1 << 19;
 
 /// Flags that are seldom set.
-const FLAGS_RARE: u32 = FLAG_FIFO_0_LOST
-    | FLAG_FIFO_1_LOST
-    | FLAG_ERROR_PASSIVE
-    | FLAG_ERROR_WARNING
-    | FLAG_BUS_OFF;
+const FLAGS_RARE: u32 =
+    FLAG_FIFO_0_LOST | FLAG_FIFO_1_LOST | FLAG_ERROR_PASSIVE | FLAG_ERROR_WARNING | FLAG_BUS_OFF;
 
 impl Flags {
     /// Frames came into that FIFO since the flags were last taken.

@@ -46,6 +46,8 @@ pub struct Config {
     /// When in each period [`Devices::deadline`] comes due, in microseconds
     /// after its start; less than `period_us`.
     pub deadline_us: u16,
+    /// The same for a second event of [`Devices::deadline`]; 0: there is none.
+    pub second_us: u16,
     /// After how long without [`watchdog::Watchdog::feed`] the board resets,
     /// in milliseconds, 1..=500.
     pub watchdog_ms: u32,
@@ -111,13 +113,25 @@ pub fn setup<const CAN: u8>(peripherals: pac::Peripherals, config: &Config) -> D
     let [first, second, third] = &config.can;
     pac::FDCAN1::enable(&mut rcc);
     if uses(CAN, 0) {
-        can::setup(peripherals.FDCAN1.fdcan_unchecked(), Controller::FDCAN1, first);
+        can::setup(
+            peripherals.FDCAN1.fdcan_unchecked(),
+            Controller::FDCAN1,
+            first,
+        );
     }
     if uses(CAN, 1) {
-        can::setup(peripherals.FDCAN2.fdcan_unchecked(), Controller::FDCAN2, second);
+        can::setup(
+            peripherals.FDCAN2.fdcan_unchecked(),
+            Controller::FDCAN2,
+            second,
+        );
     }
     if uses(CAN, 2) {
-        can::setup(peripherals.FDCAN3.fdcan_unchecked(), Controller::FDCAN3, third);
+        can::setup(
+            peripherals.FDCAN3.fdcan_unchecked(),
+            Controller::FDCAN3,
+            third,
+        );
     }
     let timers = timers::setup(
         timers::Peripherals {
@@ -129,6 +143,7 @@ pub fn setup<const CAN: u8>(peripherals: pac::Peripherals, config: &Config) -> D
         &mut rcc,
         config.period_us,
         config.deadline_us,
+        config.second_us,
     );
     Devices {
         reset_cause,

@@ -40,6 +40,15 @@ impl Deadline {
         self.elapsed_us() >= self.0.ccr1().read().ccr().bits() as u16
     }
 
+    /// Whether the second event has come since the last call.
+    pub fn take_second(&mut self) -> bool {
+        let come = self.0.sr().read().cc2if().bit_is_set();
+        if come {
+            self.0.sr().write(|w| w.cc2if().clear_bit());
+        }
+        come
+    }
+
     /// Microseconds since the period began.
     pub fn elapsed_us(&self) -> u16 {
         self.0.cnt().read().cnt().bits()
@@ -149,7 +158,13 @@ pub(crate) struct Timers {
 /// # Panics
 ///
 /// If `period_us` is 0 or `deadline_us` does not lie within the period.
-pub(crate) fn setup(p: Peripherals, rcc: &mut Rcc, period_us: u16, deadline_us: u16) -> Timers {
+pub(crate) fn setup(
+    p: Peripherals,
+    rcc: &mut Rcc,
+    period_us: u16,
+    deadline_us: u16,
+    second_us: u16,
+) -> Timers {
     assert!(period_us > 0 && deadline_us < period_us);
     pac::TIM2::enable(rcc);
     pac::TIM2::reset(rcc);
@@ -181,7 +196,10 @@ pub(crate) fn setup(p: Peripherals, rcc: &mut Rcc, period_us: u16, deadline_us: 
         .write(|w| w.arr().set(u32::from(period_us) - 1));
     p.tim3.ccr1().write(|w| w.ccr().set(deadline_us.into()));
     p.tim3.egr().write(|w| w.ug().update());
-    p.tim3.dier().write(|w| w.cc1ie().enabled());
+    p.tim3.ccr2().write(|w| w.ccr().set(second_us.into()));
+    p.tim3
+        .dier()
+        .write(|w| w.cc1ie().enabled().cc2ie().bit(second_us != 0));
 
     p.tim5.cr1().write(|w| w.urs().counter_only());
     p.tim5.psc().write(|w| w.psc().set(MICROSECOND_PRESCALER));

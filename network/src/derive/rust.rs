@@ -72,16 +72,6 @@ fn write(machine: &Machine, library: &str, out: &mut String) -> std::fmt::Result
     let rpdos = layouts().map(|layout| layout.after_tpdos_us() - layout.demand.compute_us);
     let rpdos = rpdos.max().unwrap_or(0);
     writeln!(out, "pub const RPDOS_US: u16 = {rpdos};")?;
-    writeln!(
-        out,
-        "/// Prescaler, segment 1 and segment 2 of the bit timing."
-    )?;
-    let t = bus.timing;
-    writeln!(
-        out,
-        "pub const BIT_TIMING: (u16, u16, u16) = ({}, {}, {});",
-        t.prescaler, t.seg1, t.seg2
-    )?;
     super::cycle::cycle(machine, out)?;
     out.push('\n');
     motors(machine, out)?;

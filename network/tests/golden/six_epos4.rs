@@ -18,8 +18,6 @@ pub const LONGEST_CYCLE_US: u32 = 65535;
 pub const COMPUTE_US: u16 = 200;
 /// From the first RPDO of a cycle to the end of the last and the guard, us.
 pub const RPDOS_US: u16 = 825;
-/// Prescaler, segment 1 and segment 2 of the bit timing.
-pub const BIT_TIMING: (u16, u16, u16) = (1, 20, 3);
 /// Buses, in the order of their names.
 pub const BUSES: usize = 1;
 /// The controller of each: 1 for FDCAN1.
