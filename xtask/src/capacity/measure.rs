@@ -279,10 +279,8 @@ fn round_of(bench: &mut Bench, ids: &[NodeId], nodes: u32) -> Result<Round> {
     for n in 0..nodes as usize {
         let id = ids[n % ids.len()];
         let command = random.command();
-        for frame in [0, 1]
-            .into_iter()
-            .filter_map(|n| pdos.rpdo(n, id, &command))
-        {
+        let image = pdos.image(&command);
+        for frame in [0, 1].iter().filter_map(|n| pdos.rpdo(*n, id, &image)) {
             bench.send(frame);
         }
         commands.retain(|(other, _)| *other != id);
