@@ -47,7 +47,7 @@ fn tests(args: &[String]) -> Result<()> {
 /// `cargo xtask ci`: everything that has to pass, in the order of how soon it
 /// fails.
 pub(crate) fn command(options: &CiOptions) -> Result<ExitCode> {
-    let steps: [Step; 12] = [
+    let steps: [Step; 13] = [
         ("format", format),
         ("lints, host", lints_host),
         ("lints, board", lints_target),
@@ -57,6 +57,7 @@ pub(crate) fn command(options: &CiOptions) -> Result<ExitCode> {
         ("one run", one_run),
         ("bench startup", || benched(Bench::Startup)),
         ("bench sdo", || benched(Bench::Sdo)),
+        ("bench instructions", instructions),
         ("other tools", interop::tests),
         ("documentation", documentation),
         ("conformance table", conformance::check),
@@ -133,6 +134,15 @@ fn one_run() -> Result<()> {
     Ok(())
 }
 
+/// Where there is no Valgrind, that is said, and nothing is counted.
+fn instructions() -> Result<()> {
+    if !bench::instructions::is_possible() {
+        eprintln!("left out: {}", bench::instructions::MISSING);
+        return Ok(());
+    }
+    benched(Bench::Instructions)
+}
+
 fn benched(bench: Bench) -> Result<()> {
     let options = BenchOptions {
         bench,
@@ -140,6 +150,7 @@ fn benched(bench: Bench) -> Result<()> {
         scenario: None,
         seconds: REALTIME_S,
         seeds: 1,
+        accept: false,
         json: false,
     };
     if bench::command(&options)? != ExitCode::SUCCESS {

@@ -226,6 +226,9 @@ pub(crate) struct BenchOptions {
     /// Of `realtime`: how many seeds, from --seed on
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
     pub(crate) seeds: u64,
+    /// Of `instructions`: write the limits anew, a tenth above what is counted
+    #[arg(long)]
+    pub(crate) accept: bool,
     /// One JSON object on standard output and nothing else there
     #[arg(long)]
     pub(crate) json: bool,
@@ -242,6 +245,8 @@ pub(crate) enum Bench {
     Motion,
     /// Whether the cycle holds at 2 ms and 1 ms, and how even the SYNC is
     Realtime,
+    /// How many instructions the hot functions take: wants Valgrind
+    Instructions,
 }
 
 /// Severities as they are typed.

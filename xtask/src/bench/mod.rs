@@ -1,6 +1,8 @@
 //! `cargo xtask bench`: figures that the release image has to reach on the
-//! emulated board, judged on the bus.
+//! emulated board, judged on the bus; and instructions of the library's hot
+//! functions.
 
+pub(crate) mod instructions;
 mod motion;
 pub(crate) mod realtime;
 mod sdo;
@@ -22,6 +24,7 @@ pub(crate) fn command(options: &BenchOptions) -> Result<ExitCode> {
         Bench::Startup => startup::run(&image()?, options.seed)?,
         Bench::Sdo => sdo::run(&image()?, options.seed)?,
         Bench::Motion => motion::run(&image()?, options.seed)?,
+        Bench::Instructions => instructions::run(options.accept)?,
         Bench::Realtime => realtime::run(&order(options))?,
     };
     if options.json {
