@@ -311,10 +311,10 @@ fn the_sync_follows_1005h_1006h_and_1019h_in_pre_operational() {
     refused(client.put(0x1006, 0, 65_536, 4), AbortCode::VALUE_TOO_HIGH);
     // The smallest cycle that the check of network.toml lets through with its
     // deadline of the TPDOs.
-    refused(client.put(0x1006, 0, 6_834, 4), AbortCode::VALUE_TOO_LOW);
-    client.put(0x1006, 0, 6_835, 4).unwrap();
+    refused(client.put(0x1006, 0, 6_024, 4), AbortCode::VALUE_TOO_LOW);
+    client.put(0x1006, 0, 6_025, 4).unwrap();
     client.put(0x1006, 0, 10_000, 4).unwrap();
-    refused(client.put(0x1007, 0, 6_834, 4), AbortCode::VALUE_TOO_LOW);
+    refused(client.put(0x1007, 0, 6_024, 4), AbortCode::VALUE_TOO_LOW);
     refused(client.put(0x1007, 0, 10_001, 4), AbortCode::VALUE_TOO_HIGH);
     refused(client.put(0x1019, 0, 3, 1), AbortCode::DEVICE_STATE);
     client.put(0x1006, 0, 0, 4).unwrap();
