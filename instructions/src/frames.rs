@@ -4,7 +4,7 @@ use std::hint::black_box;
 
 use canmaster::Frame;
 use canmaster::id::CobId;
-use canmaster::master::TxQueue;
+use canmaster::master::{Burst, TxQueue};
 use embedded_can::{Frame as _, Id, StandardId};
 
 const ROOM: usize = 36;
@@ -52,6 +52,20 @@ pub(crate) fn next(times: u32) {
     for _ in 0..times {
         fill(&mut queue);
         while let Some(frame) = queue.next(black_box(&[u16::MAX; 3])) {
+            black_box(frame);
+        }
+    }
+}
+
+/// A burst of RPDOs, from the step of the axes to the controller.
+pub(crate) fn burst_of_six(times: u32) {
+    let mut burst = Burst::<ROOM>::new();
+    for _ in 0..times {
+        black_box(burst.begin());
+        for node in 1..=BURST {
+            burst.put(black_box(frame(RPDO1 + node)));
+        }
+        while let Some(frame) = burst.next(black_box(&[u16::MAX; 3])) {
             black_box(frame);
         }
     }

@@ -31,10 +31,11 @@ const fn case(name: &'static str, (few, many): (u32, u32), run: fn(u32)) -> Case
     }
 }
 
-const CASES: [Case; 21] = [
+const CASES: [Case; 22] = [
     case("TxQueue put, six frames", (100, 300), frames::put),
     case("TxQueue put_latest", (100, 300), frames::put_latest),
     case("TxQueue put and next, six", (100, 300), frames::next),
+    case("Burst put and next, six", (100, 300), frames::burst_of_six),
     case("frame from bytes", (100, 300), frames::from_bytes),
     case("frame to bytes", (100, 300), frames::to_bytes),
     case("MasterOd store", (100, 300), pdos::store),

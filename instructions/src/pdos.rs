@@ -26,12 +26,11 @@ fn slots() -> impl Iterator<Item = TpdoSlot> + Clone {
 
 fn opened() -> MasterOd<AXES> {
     let mut od = MasterOd::new(&TPDO_BYTES);
-    od.set_sync_producer(true);
-    od.open_cycle();
+    od.follow(1);
     od
 }
 
-/// The last TPDO of a cycle.
+/// A TPDO of a cycle.
 pub(crate) fn store(times: u32) {
     let mut od = opened();
     for slot in slots().cycle().take(times as usize) {
@@ -42,21 +41,25 @@ pub(crate) fn store(times: u32) {
 /// A cycle that opens and is taken at the deadline.
 pub(crate) fn take_cycle(times: u32) {
     let mut od = opened();
-    for _ in 0..times {
-        od.open_cycle();
-        black_box(od.take_cycle(black_box(true)));
+    for sync in 1..=times {
+        od.follow(black_box(sync));
+        black_box(od.take_cycle(true, black_box(true)));
     }
 }
 
 /// Of one axis.
 pub(crate) fn feedback(times: u32) {
     let [pdos, ..] = &PDOS;
+    let mut od = opened();
+    for slot in slots() {
+        od.store(slot, TPDO, BYTES);
+    }
     for _ in 0..times {
-        black_box(black_box(pdos).feedback(black_box(&[TPDO; TPDOS_PER_AXIS]), true));
+        black_box(black_box(pdos).feedback(black_box(od.image(0)), true));
     }
 }
 
-/// RPDO1 of one axis.
+/// The objects of one axis, and its RPDO1.
 pub(crate) fn rpdo(times: u32) {
     let [pdos, ..] = &PDOS;
     let command = AxisCommand {
@@ -66,6 +69,7 @@ pub(crate) fn rpdo(times: u32) {
         deceleration: 1500,
     };
     for _ in 0..times {
-        black_box(black_box(pdos).rpdo(black_box(0), NODE, black_box(&command)));
+        let image = black_box(pdos).image(black_box(&command));
+        black_box(pdos.rpdo(black_box(0), NODE, black_box(&image)));
     }
 }
