@@ -24,6 +24,7 @@ fn bad_input_ends_with_usage_and_exit_code_two() {
         &["run", "--bridge", "localhost:2000"],
         &["run", "--fault", "3:loud"],
         &["campaign", "--seeds", "0"],
+        &["campaign", "--faults", "--seconds", "5"],
         &["size", "now"],
         &["new"],
         &["capacity", "--fast"],
@@ -285,6 +286,41 @@ fn the_startup_bench_prints_one_json_object_with_the_documented_names() {
     assert!(figure("ratio") <= 1.3 && figure("ratio") >= 1.0, "{object}");
     assert!(figure("configure_ms") >= figure("wire_bound_ms"));
     assert!(figure("sequential_ms") >= 2.0 * figure("configure_ms"));
+}
+
+#[test]
+fn the_motion_bench_prints_one_json_object_with_a_row_for_each_mode() {
+    let assert = xtask().args(["bench", "motion", "--json"]).assert();
+    let object: Value = serde_json::from_slice(&assert.get_output().stdout).unwrap();
+    assert_eq!(object["axes"], 6);
+    let modes = object["modes"].as_array().unwrap();
+    assert_eq!(modes[0]["mode"], "profile velocity");
+    for mode in modes {
+        let (mean, worst) = (mode["mean"].as_f64(), mode["worst"].as_u64());
+        assert!(mean.unwrap() > 0.0 && mean.unwrap() <= worst.unwrap() as f64);
+    }
+    let slow = modes
+        .iter()
+        .any(|mode| mode["worst"].as_u64() > Some(10_000));
+    assert_eq!(object["result"], if slow { "failed" } else { "ok" });
+}
+
+#[test]
+fn a_campaign_of_faults_prints_one_json_object() {
+    let assert = xtask()
+        .args(["campaign", "--faults", "--seeds", "1", "--json"])
+        .assert()
+        .success();
+    let object: Value = serde_json::from_slice(&assert.get_output().stdout).unwrap();
+    assert_eq!(
+        (&object["result"], &object["seeds"]),
+        (&"ok".into(), &1.into())
+    );
+    let run = &object["runs"][0];
+    assert_eq!((&run["seed"], &run["ok"]), (&1.into(), &true.into()));
+    for name in ["cause", "phase", "node", "at_s", "allowed_ms", "recovered"] {
+        assert!(!run[name].is_null(), "{name}: {run}");
+    }
 }
 
 #[test]

@@ -280,7 +280,7 @@ pub enum DriveFault {
 pub enum Trouble {
     /// Controlwords change nothing there: the next state is never confirmed.
     Deaf,
-    /// Controlwords act this much later there.
+    /// A controlword acts this much later there: the one that is the newest then.
     Slow(Spread),
     /// It does not stay there: the power stage loses its voltage or its enabling
     /// input, which is no error (CiA 402-2, transitions 7, 9, 10 and 12).

@@ -82,6 +82,7 @@ impl Drive {
     fn end_communication(&mut self) {
         // Whatever was planned for the old life is void.
         self.lives += 1;
+        self.hesitates = false;
         self.bus_off = false;
         self.controller.clear();
         self.service.reset(&mut self.od);
@@ -158,13 +159,26 @@ impl Drive {
             Trouble::Slow(delay) => Some(delay),
             _ => None,
         });
-        match slow.or(self.control_delay) {
+        if let Some(delay) = slow {
+            if !std::mem::replace(&mut self.hesitates, true) {
+                let us = delay.draw(&mut self.random);
+                self.plan(self.now + self.clock.span(us), Job::Hesitated);
+            }
+            return;
+        }
+        match self.control_delay {
             Some(delay) => {
                 let us = delay.draw(&mut self.random);
                 self.plan(self.now + self.clock.span(us), Job::Control(word));
             }
             None => self.control(word),
         }
+    }
+
+    /// The newest controlword acts at last.
+    pub(super) fn hesitated(&mut self) {
+        self.hesitates = false;
+        self.control(self.od.number(0x6040, 0) as u16);
     }
 
     /// A controlword acts.

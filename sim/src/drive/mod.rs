@@ -97,6 +97,8 @@ enum Job {
     BusOffOver,
     /// A controlword acts, late.
     Control(u16),
+    /// The newest controlword acts, late.
+    Hesitated,
     /// The mode stays from now on.
     StickMode,
     /// Another load on the shaft, per mille of rated torque.
@@ -137,6 +139,8 @@ pub struct Drive {
     /// bit/s, in use.
     bit_rate: u32,
     control_delay: Option<Spread>,
+    /// A controlword waits in a state that is left slowly.
+    hesitates: bool,
     /// State of CiA 402 whose entering was seen.
     watched_state: cia402::State,
     bus_off: bool,
@@ -177,6 +181,7 @@ impl Drive {
             guarding: Guarding::default(),
             bit_rate: config.bit_rate,
             control_delay: None,
+            hesitates: false,
             watched_state: cia402::State::NotReadyToSwitchOn,
             bus_off: false,
             controller: Controller::default(),
@@ -304,6 +309,7 @@ impl Drive {
             Job::SpeakAgain => self.speak_again(),
             Job::BusOffOver => self.bus_off_over(),
             Job::Control(word) => self.control(word),
+            Job::Hesitated => self.hesitated(),
             Job::StickMode => self.axis.stick_mode(),
             Job::Load(permille) => self.axis.set_load(permille.into()),
             Job::Block(blocked) => self.axis.block(blocked),

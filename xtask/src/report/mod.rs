@@ -50,8 +50,8 @@ pub(crate) fn html(record: &Record, summary: &Summary) -> Result<String> {
     write!(
         page,
         "<footer>The firmware image ran on an emulated board, with a bus and drives in virtual \
-         time. Motion is judged in the plant and frames on the wire; nothing here is reported by \
-         the firmware about itself. Emulation knows no analogue effects, no transceivers and no \
+         time. Motion is judged in the plant and frames on the wire; but for the state of the \
+         group nothing here is reported by the firmware about itself. Emulation knows no analogue effects, no transceivers and no \
          flash wait states.</footer>\n</body></html>\n"
     )?;
     Ok(page)
