@@ -52,6 +52,9 @@ struct Line {
     values: Vec<TokenStream>,
 }
 
+/// From so many patterns on their number is worked out by itself.
+const MANY: usize = 4;
+
 type Result<T> = std::result::Result<T, &'static str>;
 
 impl Words {
@@ -115,15 +118,23 @@ impl Words {
         let all: Literal = format!("\"{}\"", all.join("|"))
             .parse()
             .map_err(|_| "not the words of a plain string literal")?;
+        let name = &self.name;
         let place = match &self.by {
             _ if self.lines.len() == 1 => quote!(),
             Some(by) => quote!(defmt::export::u8(&#by(self));),
+            None if places.len() > MANY => quote!({
+                // By itself it is a table, else it becomes part of what follows.
+                #[inline(never)]
+                fn place(value: &#name) -> u8 {
+                    match *value { #(#places)* }
+                }
+                defmt::export::u8(&place(self));
+            }),
             None => quote!(defmt::export::u8(&match *self { #(#places)* });),
         };
         if written.len() < self.lines.len() {
             written.push(quote!(_ => {}));
         }
-        let name = &self.name;
         Ok(quote! {
             impl defmt::Format for #name {
                 fn format(&self, f: defmt::Formatter<'_>) {
