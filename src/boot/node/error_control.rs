@@ -5,8 +5,8 @@ use super::super::event::{Action, Event};
 use super::super::failure::{BootResult, Cause, Failure, Status};
 use super::super::settings::Assignment;
 use super::state::{
-    AwaitBootUp, AwaitErrorControl, AwaitReset, AwaitState, Configure, Identify, Lost, Operational,
-    Ready, Starting, State,
+    AwaitBootUp, AwaitErrorControl, AwaitReset, AwaitState, Configure, Lost, Operational, Ready,
+    Starting, State,
 };
 use super::{ATTEMPT, NodeBoot, deadline};
 use crate::frame::Frame;
@@ -27,9 +27,10 @@ impl NodeBoot {
         let Some(ErrorControl { state, .. }) = ErrorControl::decode(frame) else {
             return;
         };
+        self.now = now;
         let counts = self.guardian.on_frame(frame, now).is_some();
         if state == nmt::State::Initialising {
-            return self.on_boot_up(now);
+            return self.on_boot_up();
         }
         // Of a node that was not reset nobody knows the toggle bit.
         if self.is_asked() && !counts && !matches!(self.state, State::AwaitState(_)) {
@@ -38,26 +39,26 @@ impl NodeBoot {
         let operational = state == nmt::State::Operational;
         match self.state {
             State::AwaitState(_) if operational => {
-                self.state = State::Operational(Operational);
+                self.enter(State::Operational(Operational));
                 if core::mem::take(&mut self.lost) {
                     self.report(Event::NodeBack(self.node.id));
                 }
                 self.done(BootResult::LeftRunning, Event::LeftRunning(self.node.id));
             }
-            State::AwaitState(_) => self.reset(false, now),
+            State::AwaitState(_) => self.reset(false),
             State::AwaitErrorControl(_) => self.ready(),
             State::Ready(_) | State::Starting(_) if operational && !self.held => self.operational(),
             State::Operational(_) if !operational => {
                 self.lose(false);
             }
-            State::GivenUp(_) => self.on_sign_of_life(now),
+            State::GivenUp(_) => self.on_sign_of_life(),
             _ => {}
         }
     }
 
     /// It booted, or booted again in the middle of everything: whatever was
     /// done is gone, so all starts over.
-    fn on_boot_up(&mut self, now: Instant) {
+    fn on_boot_up(&mut self) {
         if self.lose(true) {
             return;
         }
@@ -66,47 +67,43 @@ impl NodeBoot {
             State::GivenUp(_) => self.restarts = 0,
             State::AwaitBootUp(_) | State::AwaitReset(_) => {}
             _ if !self.fresh || !self.is(Assignment::MAY_START) => {}
-            _ => return self.restarted(now),
+            _ => return self.restarted(),
         }
-        self.booted(now);
+        self.booted();
     }
 
     /// It booted again too soon.
-    fn restarted(&mut self, now: Instant) {
+    fn restarted(&mut self) {
         self.restarts += 1;
         if self.restarts < self.network.master.sdo_tries {
-            return self.booted(now);
+            return self.booted();
         }
         self.client.reset();
-        self.fail(Status::B, Cause::Restarts, now);
+        self.fail(Status::B, Cause::Restarts);
     }
 
     /// After the boot-up frame.
-    fn booted(&mut self, now: Instant) {
-        let restored = matches!(
-            self.state,
-            State::AwaitReset(AwaitReset { restored: true, .. })
-        );
-        let verified = matches!(self.state, State::AwaitReset(_));
+    fn booted(&mut self) {
+        let before = self.state;
         self.client.reset();
         self.tries = 0;
         self.fresh = true;
         self.report(Event::BootUp(self.node.id));
         if !self.is(Assignment::MAY_START) {
-            return self.await_error_control(now);
+            return self.await_error_control();
         }
         self.send(Command::EnterPreOperational);
-        if restored {
-            self.state = State::Configure(Configure { done: 0 });
-        } else if verified {
-            self.verify();
-        } else {
-            self.state = State::Identify(Identify { item: 0 });
+        match before {
+            State::AwaitReset(AwaitReset { restored: true }) => {
+                self.enter(State::Configure(Configure { done: 0 }));
+            }
+            State::AwaitReset(_) => self.verify(),
+            _ => self.identify(0),
         }
     }
 
     /// A node that was given up because nothing was heard of it is there.
-    fn on_sign_of_life(&mut self, now: Instant) {
+    fn on_sign_of_life(&mut self) {
         let unheard = matches!(
             self.result,
             BootResult::Failed(Failure {
@@ -117,12 +114,10 @@ impl NodeBoot {
         if !self.is(Assignment::MAY_START) {
             self.ready();
         } else if unheard && self.is(Assignment::KEEP_ALIVE) {
-            self.state = State::Identify(Identify { item: 0 });
+            self.identify(0);
         } else if unheard {
             self.send(Command::ResetCommunication);
-            self.state = State::AwaitBootUp(AwaitBootUp {
-                until: self.attempt_end(now),
-            });
+            self.enter_until(State::AwaitBootUp(AwaitBootUp), self.attempt_end());
         }
     }
 
@@ -133,7 +128,7 @@ impl NodeBoot {
         }
         self.lost = true;
         self.result = BootResult::Pending;
-        self.state = State::Lost(Lost { booted });
+        self.enter(State::Lost(Lost { booted }));
         self.report(Event::NodeLost(self.node.id));
         true
     }
@@ -150,9 +145,10 @@ impl NodeBoot {
         if !booted || !may_start {
             return self.begin(boot_time, may_start, now);
         }
+        self.now = now;
         self.held = false;
         self.boot_deadline = deadline(boot_time, now);
-        self.restarted(now);
+        self.restarted();
     }
 
     /// Sends a reset that was requested, and boots the node again.
@@ -172,7 +168,7 @@ impl NodeBoot {
     }
 
     /// Resets this node alone in the middle of its boot-up.
-    pub(super) fn reset(&mut self, restored: bool, now: Instant) {
+    pub(super) fn reset(&mut self, restored: bool) {
         // What was restored is in force after a reset of the node
         // (CiA 301, 7.5.2.14).
         self.send(if restored {
@@ -180,36 +176,34 @@ impl NodeBoot {
         } else {
             Command::ResetCommunication
         });
-        self.state = State::AwaitReset(AwaitReset {
-            deadline: self.attempt_end(now),
-            restored,
-        });
+        let state = State::AwaitReset(AwaitReset { restored });
+        self.enter_until(state, self.attempt_end());
     }
 
-    fn attempt_end(&self, now: Instant) -> Instant {
-        self.boot_end(now).max(now + ATTEMPT)
+    fn attempt_end(&self) -> Instant {
+        self.boot_end().max(self.now + ATTEMPT)
     }
 
     /// Step 7, entered with the identity checked.
-    pub(super) fn await_state(&mut self, now: Instant) {
-        if self.patience() == Duration::ZERO {
-            return self.reset(false, now);
+    pub(super) fn await_state(&mut self) {
+        match self.patience() {
+            Duration::ZERO => self.reset(false),
+            patience => {
+                self.guard();
+                self.enter_for(State::AwaitState(AwaitState), patience);
+            }
         }
-        self.guard(now);
-        self.state = State::AwaitState(AwaitState {
-            deadline: now + self.patience(),
-        });
     }
 
     /// Step 9.
-    pub(super) fn await_error_control(&mut self, now: Instant) {
-        if self.patience() == Duration::ZERO {
-            return self.ready();
+    pub(super) fn await_error_control(&mut self) {
+        match self.patience() {
+            Duration::ZERO => self.ready(),
+            patience => {
+                self.guard();
+                self.enter_for(State::AwaitErrorControl(AwaitErrorControl), patience);
+            }
         }
-        self.guard(now);
-        self.state = State::AwaitErrorControl(AwaitErrorControl {
-            deadline: now + self.patience(),
-        });
     }
 
     /// How long error control may stay away; zero if there is none.
@@ -225,7 +219,7 @@ impl NodeBoot {
     }
 
     fn ready(&mut self) {
-        self.state = State::Ready(Ready);
+        self.enter(State::Ready(Ready));
         self.done(BootResult::Booted, Event::Ready(self.node.id));
     }
 
@@ -236,7 +230,7 @@ impl NodeBoot {
     }
 
     fn operational(&mut self) {
-        self.state = State::Operational(Operational);
+        self.enter(State::Operational(Operational));
         self.restarts = 0;
         let back = core::mem::take(&mut self.lost);
         self.report(if back {
@@ -248,17 +242,19 @@ impl NodeBoot {
 
     /// NMT start goes, or went by broadcast, to the node.
     pub(in super::super) fn start(&mut self, alone: bool, now: Instant) {
+        self.now = now;
         if alone {
             self.send(Command::Start);
         }
-        if self.patience() == Duration::ZERO {
-            return self.operational();
+        match self.patience() {
+            Duration::ZERO => self.operational(),
+            patience => {
+                // A guarded node is asked when its time comes, not at once.
+                let asked = self.settings.assignment.guard_time();
+                let time = patience.max(START_TIME) + asked;
+                self.enter_for(State::Starting(Starting), time);
+            }
         }
-        // A guarded node is asked when its time comes, not at once.
-        let asked = self.settings.assignment.guard_time();
-        self.state = State::Starting(Starting {
-            deadline: now + self.patience().max(START_TIME) + asked,
-        });
     }
 
     /// Somebody asked for another state than operational, or for operational
@@ -267,7 +263,7 @@ impl NodeBoot {
         if self.is_up() {
             self.held = held;
             if held {
-                self.state = State::Ready(Ready);
+                self.enter(State::Ready(Ready));
             }
         }
     }
@@ -278,23 +274,23 @@ impl NodeBoot {
     }
 
     /// Begins node guarding (CiA 301, 7.2.8.3.2.1), if the node has no heartbeat.
-    pub(super) fn guard(&mut self, now: Instant) {
+    pub(super) fn guard(&mut self) {
         let time = match self.is_asked() {
             true => self.settings.assignment.guard_time(),
             false => Duration::ZERO,
         };
         let retries = self.settings.assignment.guard_retries();
         self.guardian = Guardian::new(self.node.id, time, retries);
-        self.guardian.start(now);
+        self.guardian.start(self.now);
     }
 
     /// Asks a guarded node for its state when it is time, and loses it when it
     /// does not answer.
-    pub(super) fn ask_for_state(&mut self, now: Instant) {
+    pub(super) fn ask_for_state(&mut self) {
         if !self.state.is_guarded() {
             return;
         }
-        match self.guardian.poll(now) {
+        match self.guardian.poll(self.now) {
             Some(Guard::Ask(frame)) => self.push(Action::Send(frame)),
             Some(Guard::Lost(_)) => {
                 self.lose(false);

@@ -47,6 +47,10 @@ pub(super) struct NodeBoot {
     node: &'static Node,
     settings: NodeSettings,
     state: State,
+    /// When time alone leads out of the state.
+    until: Instant,
+    /// The time of what is being done: it is wanted in many places.
+    now: Instant,
     network: &'static Network,
     result: BootResult,
     /// End of the boot time 1F89h, which may be [`Instant::NEVER`].
@@ -69,6 +73,8 @@ impl NodeBoot {
             settings,
             client: Client::new(node.id, node.sdo_timeout),
             state: State::Idle(Idle),
+            until: Instant::NEVER,
+            now: Instant::ZERO,
             boot_deadline: Instant::NEVER,
             guardian: Guardian::new(node.id, Duration::ZERO, 0),
             tries: 0,
@@ -156,9 +162,10 @@ impl NodeBoot {
 
     /// Nobody is looked for any more. Whether it is given up for that.
     pub(super) fn not_found(&mut self, now: Instant) -> bool {
+        self.now = now;
         let missing = self.is_missing();
         if missing {
-            self.fail(Status::B, Cause::NoBootUp, now);
+            self.fail(Status::B, Cause::NoBootUp);
         }
         missing
     }
@@ -166,10 +173,9 @@ impl NodeBoot {
     /// It was reset, or given its node-ID: it boots.
     #[inline(never)]
     pub(super) fn await_boot_up(&mut self, boot_time: Duration, now: Instant) {
+        self.now = now;
         self.boot_deadline = deadline(boot_time, now);
-        self.state = State::AwaitBootUp(AwaitBootUp {
-            until: self.boot_end(now),
-        });
+        self.enter_until(State::AwaitBootUp(AwaitBootUp), self.boot_end());
     }
 
     /// The boot-up begins. `reset`: the node is to be reset by itself, unless it
@@ -195,19 +201,18 @@ impl NodeBoot {
         }
         self.await_boot_up(boot_time, now);
         if !self.is(Assignment::MAY_START) {
-            self.guard(now);
-            self.state = State::AwaitErrorControl(AwaitErrorControl {
-                deadline: self.boot_end(now) + self.patience(),
-            });
+            self.guard();
+            let end = self.boot_end() + self.patience();
+            self.enter_until(State::AwaitErrorControl(AwaitErrorControl), end);
         } else if keep_alive {
-            self.state = State::Identify(Identify { item: 0 });
+            self.identify(0);
         }
     }
 
     /// Nothing more is done until [`begin`](Self::begin).
     pub(super) fn halt(&mut self) {
         self.client.reset();
-        self.state = State::Idle(Idle);
+        self.enter(State::Idle(Idle));
         self.tries = 0;
         self.fresh = false;
     }
@@ -217,17 +222,18 @@ impl NodeBoot {
         if let Some(action) = self.outbox.pop_front() {
             return Some(action);
         }
+        self.now = now;
         let progress = self.client.poll(now);
-        self.on_progress(progress, now);
-        self.advance(now);
-        self.ask_for_state(now);
+        self.on_progress(progress);
+        self.advance();
+        self.ask_for_state();
         self.outbox.pop_front()
     }
 
     /// When [`poll`](Self::poll) has to be called again at the latest.
     pub(super) fn next_deadline(&self) -> Instant {
         let client = Instant::of(self.client.next_deadline());
-        let next = self.state.deadline().min(client);
+        let next = self.until.min(client);
         match self.state.is_guarded() {
             true => next.min(Instant::of(self.guardian.next_deadline())),
             false => next,
@@ -235,46 +241,60 @@ impl NodeBoot {
     }
 
     /// The time of a state is over.
-    fn expire(&mut self, now: Instant) {
-        match self.state {
-            State::AwaitBootUp(_) if self.search => self.state = State::Missing(Missing),
-            State::AwaitBootUp(_) if self.boot_time_is_over(now) => {
-                self.fail(Status::B, Cause::NoBootUp, now);
+    pub(super) fn expire(&mut self) {
+        let (status, cause) = match self.state {
+            State::AwaitBootUp(_) if self.search => {
+                return self.enter(State::Missing(Missing));
             }
-            State::Retry(_) if self.boot_time_is_over(now) => {
+            State::AwaitBootUp(_) if self.boot_time_is_over() => (Status::B, Cause::NoBootUp),
+            State::Retry(_) if self.boot_time_is_over() => {
                 let at = objects::DEVICE_TYPE;
-                self.fail(Status::B, Cause::NoAnswer { at }, now);
+                (Status::B, Cause::NoAnswer { at })
             }
             State::AwaitBootUp(_) | State::Retry(_) | State::GivenUp(_) => {
-                self.state = State::Identify(Identify { item: 0 });
+                return self.identify(0);
             }
-            State::AwaitReset(AwaitReset { restored, .. }) => {
-                let status = if restored { Status::J } else { Status::B };
-                self.fail(status, Cause::NoBootUp, now);
-            }
-            State::AwaitState(_) => {
-                let status = match self.node.heartbeat_ms {
-                    0 => Status::F,
-                    _ => Status::E,
-                };
-                self.fail(status, Cause::NoState, now);
-            }
-            State::AwaitErrorControl(_) => self.fail(Status::K, Cause::NoHeartbeat, now),
-            State::Starting(_) => self.fail(Status::K, Cause::NotOperational, now),
-            _ => {}
-        }
+            State::AwaitReset(AwaitReset { restored: true }) => (Status::J, Cause::NoBootUp),
+            State::AwaitReset(_) => (Status::B, Cause::NoBootUp),
+            State::AwaitState(_) => match self.node.heartbeat_ms {
+                0 => (Status::F, Cause::NoState),
+                _ => (Status::E, Cause::NoState),
+            },
+            State::AwaitErrorControl(_) => (Status::K, Cause::NoHeartbeat),
+            State::Starting(_) => (Status::K, Cause::NotOperational),
+            _ => return,
+        };
+        self.fail(status, cause);
     }
 
-    fn boot_time_is_over(&self, now: Instant) -> bool {
-        now >= self.boot_deadline
+    fn boot_time_is_over(&self) -> bool {
+        self.now >= self.boot_deadline
     }
 
     /// How long it may take to boot.
-    fn boot_end(&self, now: Instant) -> Instant {
+    fn boot_end(&self) -> Instant {
         match self.boot_deadline {
-            Instant::NEVER => now + ATTEMPT,
+            Instant::NEVER => self.now + ATTEMPT,
             deadline => deadline,
         }
+    }
+
+    /// A state that time alone does not lead out of.
+    fn enter(&mut self, state: State) {
+        self.enter_until(state, Instant::NEVER);
+    }
+
+    fn enter_for(&mut self, state: State, time: Duration) {
+        self.enter_until(state, self.now + time);
+    }
+
+    fn enter_until(&mut self, state: State, until: Instant) {
+        self.state = state;
+        self.until = until;
+    }
+
+    fn identify(&mut self, item: u8) {
+        self.enter(State::Identify(Identify { item }));
     }
 
     /// Sends an NMT command to this node alone.
@@ -286,23 +306,21 @@ impl NodeBoot {
     }
 
     #[inline(never)]
-    fn fail(&mut self, status: Status, cause: Cause, now: Instant) {
-        let result = BootResult::Failed(Failure { status, cause });
-        let forever = status == Status::B && !self.is(Assignment::MANDATORY);
-        self.state = State::GivenUp(GivenUp {
-            retry: match forever {
-                true => now + ATTEMPT,
-                false => Instant::NEVER,
-            },
-        });
+    fn fail(&mut self, status: Status, cause: Cause) {
+        self.enter(State::GivenUp(GivenUp));
+        if status == Status::B && !self.is(Assignment::MANDATORY) {
+            self.until = self.now + ATTEMPT;
+        }
         self.tries = 0;
         self.fresh = false;
         // What is tried for ever is told once.
-        if !self.gave_up || self.result.status() != Some(status) {
-            self.report(Event::Failed(self.node.id, Failure { status, cause }));
-        }
+        let told = self.gave_up && self.result.status() == Some(status);
         self.gave_up = true;
-        self.result = result;
+        let failure = Failure { status, cause };
+        self.result = BootResult::Failed(failure);
+        if !told {
+            self.report(Event::Failed(self.node.id, failure));
+        }
     }
 
     #[inline(never)]

@@ -33,56 +33,57 @@ const IDENTITY: [(Address, Status); 5] = [
 impl NodeBoot {
     /// A frame from the node's SDO server.
     pub(in super::super) fn on_sdo(&mut self, frame: &Frame, now: Instant) {
+        self.now = now;
         let progress = self.client.on_frame(frame, now);
-        self.on_progress(progress, now);
+        self.on_progress(progress);
     }
 
     /// Sends the request that the state wants, if the channel is free.
-    pub(super) fn advance(&mut self, now: Instant) {
-        while self.advance_once(now) {}
+    pub(super) fn advance(&mut self) {
+        while self.advance_once() {}
     }
 
     /// Whether the state changed to one that may have something to send.
-    fn advance_once(&mut self, now: Instant) -> bool {
-        if now >= self.state.deadline() {
-            self.expire(now);
+    fn advance_once(&mut self) -> bool {
+        if self.now >= self.until {
+            self.expire();
             return matches!(self.state, State::Identify(_));
         }
         match self.state {
-            State::Identify(Identify { item }) => match IDENTITY.get(item) {
+            State::Identify(Identify { item }) => match IDENTITY.get(usize::from(item)) {
                 // 1000h is read even if it may be anything: it shows that the
                 // node answers.
                 Some(_) if item != 0 && self.expected(item).is_none() => {
-                    self.state = State::Identify(Identify { item: item + 1 });
+                    self.identify(item + 1);
                     return true;
                 }
-                Some((at, _)) => self.read(*at, now),
+                Some((at, _)) => self.read(*at),
                 None => {
                     self.report(Event::Identified(self.node.id));
                     if self.is(Assignment::KEEP_ALIVE) && !self.fresh {
-                        self.await_state(now);
+                        self.await_state();
                     } else {
                         self.verify();
                         return true;
                     }
                 }
             },
-            State::Verify(Verify { item }) => match SIGNATURE.get(item) {
-                Some(at) => self.read(*at, now),
+            State::Verify(Verify { item }) => match SIGNATURE.get(usize::from(item)) {
+                Some(at) => self.read(*at),
                 None => {
                     self.report(Event::Configured(self.node.id));
-                    self.await_error_control(now);
+                    self.await_error_control();
                 }
             },
             State::Restore(Restore) => {
                 let at = Address::new(objects::RESTORE_PARAMETERS, self.settings.restore);
-                self.write(ConfigWrite::u32(at, LOAD), now);
+                self.write(ConfigWrite::u32(at, LOAD));
             }
             State::Configure(Configure { done }) => match self.planned(done) {
-                Some(write) => self.write(write, now),
+                Some(write) => self.write(write),
                 None => {
                     self.report(Event::Configured(self.node.id));
-                    self.await_error_control(now);
+                    self.await_error_control();
                 }
             },
             _ => {}
@@ -95,16 +96,16 @@ impl NodeBoot {
         if self.signature_len() == 0 {
             self.begin_configuration();
         } else {
-            self.state = State::Verify(Verify { item: 0 });
+            self.enter(State::Verify(Verify { item: 0 }));
         }
     }
 
     fn begin_configuration(&mut self) {
-        self.state = if self.is(Assignment::RESTORE) && self.settings.restore != 0 {
-            State::Restore(Restore)
-        } else {
-            State::Configure(Configure { done: 0 })
-        };
+        let restores = self.is(Assignment::RESTORE) && self.settings.restore != 0;
+        self.enter(match restores {
+            true => State::Restore(Restore),
+            false => State::Configure(Configure { done: 0 }),
+        });
     }
 
     /// The write number `n` of the configuration. Date and time come last, so
@@ -130,15 +131,15 @@ impl NodeBoot {
         }
     }
 
-    fn read(&mut self, at: Address, now: Instant) {
-        let request = self.client.upload(at, now);
+    fn read(&mut self, at: Address) {
+        let request = self.client.upload(at, self.now);
         self.send_request(request);
     }
 
-    fn write(&mut self, write: ConfigWrite, now: Instant) {
+    fn write(&mut self, write: ConfigWrite) {
         let bytes = write.bytes();
         let data = bytes.get(..write.len()).unwrap_or(&bytes);
-        let request = self.client.download(write.at, data, now);
+        let request = self.client.download(write.at, data, self.now);
         self.send_request(request);
     }
 
@@ -150,31 +151,31 @@ impl NodeBoot {
         }
     }
 
-    pub(super) fn on_progress(&mut self, progress: Progress, now: Instant) {
+    pub(super) fn on_progress(&mut self, progress: Progress) {
         match progress {
             Progress::Nothing => {}
             Progress::Send(frame) => self.push(Action::Send(frame)),
             Progress::Done(response) => {
                 self.tries = 0;
-                self.on_response(response.data(), now);
+                self.on_response(response.data());
                 // The next request follows at once, not at the next poll, so
                 // that the node's latency is all that is waited for.
-                self.advance(now);
+                self.advance();
             }
             Progress::Failed(error, abort) => {
                 if let Some(abort) = abort {
                     self.push(Action::Send(abort));
                 }
-                self.on_sdo_error(error, now);
+                self.on_sdo_error(error);
             }
         }
     }
 
-    fn on_response(&mut self, data: &[u8], now: Instant) {
+    fn on_response(&mut self, data: &[u8]) {
         let found = <[u8; 4]>::try_from(data).map(u32::from_le_bytes);
         match self.state {
             State::Identify(Identify { item }) => {
-                let Some(&(at, status)) = IDENTITY.get(item) else {
+                let Some(&(at, status)) = IDENTITY.get(usize::from(item)) else {
                     return;
                 };
                 let cause = match (found, self.expected(item)) {
@@ -184,24 +185,24 @@ impl NodeBoot {
                         found,
                     },
                     (Ok(_), _) => {
-                        self.state = State::Identify(Identify { item: item + 1 });
+                        self.identify(item + 1);
                         return;
                     }
                     (Err(_), _) => Cause::Garbled { at },
                 };
-                self.fail(status, cause, now);
+                self.fail(status, cause);
             }
             State::Verify(Verify { item }) => {
-                if found.ok().as_ref() == self.node.configured.get(item) {
-                    self.state = State::Verify(Verify { item: item + 1 });
+                if found.ok().as_ref() == self.node.configured.get(usize::from(item)) {
+                    self.enter(State::Verify(Verify { item: item + 1 }));
                 } else {
                     self.begin_configuration();
                 }
             }
-            State::Restore(_) => self.reset(true, now),
+            State::Restore(_) => self.reset(true),
             State::Configure(Configure { done }) => {
                 let done = done + 1;
-                self.state = State::Configure(Configure { done });
+                self.enter(State::Configure(Configure { done }));
                 if done % REPORT_EVERY == 0 {
                     let node = self.node.id;
                     let total = self.planned + self.signature_len();
@@ -212,7 +213,7 @@ impl NodeBoot {
         }
     }
 
-    fn on_sdo_error(&mut self, error: SdoError, now: Instant) {
+    fn on_sdo_error(&mut self, error: SdoError) {
         let cause = match error {
             SdoError::Aborted { at, code } => Cause::Refused { at, code },
             SdoError::Timeout { at, .. } => Cause::NoAnswer { at },
@@ -227,32 +228,34 @@ impl NodeBoot {
         }
         self.tries = 0;
         match self.state {
-            State::Identify(Identify { item: 0 }) if !final_word => self.unreached(cause, now),
+            State::Identify(Identify { item: 0 }) if !final_word => self.unreached(cause),
             State::Identify(Identify { item }) => {
-                let status = IDENTITY.get(item).map_or(Status::B, |(_, status)| *status);
-                self.fail(status, cause, now);
+                let status = IDENTITY
+                    .get(usize::from(item))
+                    .map_or(Status::B, |(_, status)| *status);
+                self.fail(status, cause);
             }
             // It does not tell when it was configured: it is configured.
             State::Verify(_) => self.begin_configuration(),
-            State::Restore(_) | State::Configure(_) => self.fail(Status::J, cause, now),
+            State::Restore(_) | State::Configure(_) => self.fail(Status::J, cause),
             _ => {}
         }
     }
 
     /// No answer to 1000h. A mandatory node has the boot time, an optional one
     /// holds nobody up.
-    fn unreached(&mut self, cause: Cause, now: Instant) {
+    fn unreached(&mut self, cause: Cause) {
         let mandatory = self.is(Assignment::MANDATORY);
-        if mandatory && !self.has_given_up() && !self.boot_time_is_over(now) {
-            let at = self.boot_deadline.min(now + ATTEMPT);
-            self.state = State::Retry(Retry { at });
+        if mandatory && !self.has_given_up() && !self.boot_time_is_over() {
+            let at = self.boot_deadline.min(self.now + ATTEMPT);
+            self.enter_until(State::Retry(Retry), at);
         } else {
-            self.fail(Status::B, cause, now);
+            self.fail(Status::B, cause);
         }
     }
 
     /// What an entry of [`IDENTITY`] must be.
-    fn expected(&self, item: usize) -> Option<u32> {
+    fn expected(&self, item: u8) -> Option<u32> {
         let identity = &self.node.identity;
         match item {
             0 => identity.device_type,

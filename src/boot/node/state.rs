@@ -1,8 +1,6 @@
 //! The states of the boot-up of one node: one type each (CiA 302-2, "Boot
 //! slave").
 
-use crate::time::Instant;
-
 /// The network has not begun, or has come to its end (CiA 302-2, "NMT
 /// start-up", before "Boot slave").
 #[derive(Clone, Copy, Debug)]
@@ -11,9 +9,7 @@ pub(super) struct Idle;
 /// Reset communication was sent: the boot-up frame is awaited, at the longest
 /// for the boot time 1F89h (CiA 302-2, "Boot slave", before step 2).
 #[derive(Clone, Copy, Debug)]
-pub(super) struct AwaitBootUp {
-    pub(super) until: Instant,
-}
+pub(super) struct AwaitBootUp;
 
 /// It did not boot in its time and is looked for among the nodes without node-ID
 /// (CiA 302-2, "NMT start-up": LSS is required; CiA 305).
@@ -24,28 +20,23 @@ pub(super) struct Missing;
 /// "Boot slave", steps 2 to 6; B, C, D, M, N, O).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Identify {
-    pub(super) item: usize,
+    pub(super) item: u8,
 }
 
 /// No answer to 1000h: tried again, a mandatory node until the boot time is
 /// over (CiA 302-2, "Boot slave", step 2).
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Retry {
-    pub(super) at: Instant,
-}
+pub(super) struct Retry;
 
 /// A node that is to be kept alive is asked for its NMT state (CiA 302-2,
 /// "Check node state", step 7; E, F).
 #[derive(Clone, Copy, Debug)]
-pub(super) struct AwaitState {
-    pub(super) deadline: Instant,
-}
+pub(super) struct AwaitState;
 
 /// The node alone was reset on the way (CiA 302-2, "Check node state" and
 /// "Restore configuration").
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AwaitReset {
-    pub(super) deadline: Instant,
     /// Its parameters were restored; else it is yet to be verified.
     pub(super) restored: bool,
 }
@@ -54,7 +45,7 @@ pub(super) struct AwaitReset {
 /// step 8).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Verify {
-    pub(super) item: usize,
+    pub(super) item: u8,
 }
 
 /// Writing "load" to 1011h (CiA 302-2, "Restore configuration", step 8; J).
@@ -72,9 +63,7 @@ pub(super) struct Configure {
 /// boot-up frame does not count (CiA 302-2, "Start error control service",
 /// step 9; K).
 #[derive(Clone, Copy, Debug)]
-pub(super) struct AwaitErrorControl {
-    pub(super) deadline: Instant,
-}
+pub(super) struct AwaitErrorControl;
 
 /// Booted: may be started (CiA 302-2, "Boot slave", its end).
 #[derive(Clone, Copy, Debug)]
@@ -82,9 +71,7 @@ pub(super) struct Ready;
 
 /// NMT start was sent (CiA 302-2, "NMT start-up").
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Starting {
-    pub(super) deadline: Instant,
-}
+pub(super) struct Starting;
 
 /// It reports operational (CiA 302-2, "NMT start-up", its end; CiA 301,
 /// 7.2.8.3.2).
@@ -102,10 +89,7 @@ pub(super) struct Lost {
 /// Ended with a letter. An optional node that does not answer is tried for ever
 /// (CiA 302-2, "Boot slave", step 2).
 #[derive(Clone, Copy, Debug)]
-pub(super) struct GivenUp {
-    /// [`Instant::NEVER`]: it is not tried again.
-    pub(super) retry: Instant,
-}
+pub(super) struct GivenUp;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) enum State {
@@ -128,21 +112,6 @@ pub(super) enum State {
 }
 
 impl State {
-    /// When time alone leads out.
-    #[inline(never)]
-    pub(super) const fn deadline(&self) -> Instant {
-        match *self {
-            State::AwaitBootUp(AwaitBootUp { until }) => until,
-            State::Retry(Retry { at }) => at,
-            State::AwaitState(AwaitState { deadline })
-            | State::AwaitReset(AwaitReset { deadline, .. })
-            | State::AwaitErrorControl(AwaitErrorControl { deadline })
-            | State::Starting(Starting { deadline }) => deadline,
-            State::GivenUp(GivenUp { retry }) => retry,
-            _ => Instant::NEVER,
-        }
-    }
-
     /// Whether a node without heartbeat is asked for its state.
     pub(super) const fn is_guarded(&self) -> bool {
         matches!(
