@@ -239,7 +239,7 @@ impl<B: Board, const N: usize> ObjectDictionary for View<'_, B, N> {
                         Some(emcy) => {
                             window.hexadecimal(emcy.code.0);
                             window.text("h (");
-                            window.text(emcy.code.text());
+                            window.packed(&emcy.code.packed_text());
                             window.text(")");
                         }
                         None => window.text("no emergency"),

@@ -2,6 +2,7 @@
 
 use crate::network::ConfigWrite;
 use crate::od::Chunk;
+use crate::words::PackedText;
 
 /// Takes in the whole and keeps the piece from an offset on.
 pub(super) struct Window<'a> {
@@ -33,6 +34,10 @@ impl Window<'_> {
 
     pub(super) fn text(&mut self, text: &str) {
         self.put(text.as_bytes());
+    }
+
+    pub(super) fn packed(&mut self, text: &PackedText) {
+        text.spell(&mut |letter| self.put(&[letter]));
     }
 
     /// In decimal, without the formatting of the standard library: that would

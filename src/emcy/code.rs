@@ -1,7 +1,7 @@
 //! Emergency error codes: CiA 301, 7.2.7.1, table 26; CiA 402-2; EPOS4.
 
-use super::texts;
-use crate::words::in_words;
+use super::texts::{self, Meaning};
+use crate::words::{PackedText, in_words};
 
 /// How the master takes an emergency.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,8 +58,8 @@ impl EmcyCode {
 
     /// The code in words: exactly if it is known, else by its range; `None` if
     /// neither is.
-    pub fn meaning(self) -> Option<&'static str> {
-        texts::of(self.0)
+    pub const fn meaning(self) -> Option<&'static str> {
+        texts::of(self)
     }
 
     /// What the code means, or that nobody knows.
@@ -67,10 +67,15 @@ impl EmcyCode {
         self.meaning()
             .unwrap_or("unknown error, treated as a fault")
     }
+
+    /// [`text`](Self::text) as it lies in flash.
+    pub(crate) fn packed_text(self) -> PackedText {
+        texts::packed_of(self)
+    }
 }
 
 in_words!(EmcyCode {
-    code => ("{:04X}h ({})", code.0, code.text()),
+    code => ("{:04X}h ({})", code.0, Meaning(code)),
 });
 
 #[cfg(test)]

@@ -1,5 +1,9 @@
-//! The same words for people at the host and for the log of the firmware.
+//! The same words for people at the host, in the log of the firmware, and in its
+//! object dictionary.
 
+mod packed;
+
+use packed::Packed;
 use proc_macro2::{Delimiter, Group, Literal, TokenStream, TokenTree};
 use quote::quote;
 
@@ -30,6 +34,47 @@ pub fn in_words(input: proc_macro::TokenStream) -> proc_macro::TokenStream {
 #[proc_macro]
 pub fn in_log(input: proc_macro::TokenStream) -> proc_macro::TokenStream {
     or_error(Words::read(input.into()).and_then(|words| words.format()))
+}
+
+/// Packs texts for the image: `packed!(WORDS: "one", "another")` is a constant
+/// `WORDS` of the type `Packed`, which has to be in scope.
+#[proc_macro]
+pub fn packed(input: proc_macro::TokenStream) -> proc_macro::TokenStream {
+    or_error(packed_texts(input.into()))
+}
+
+fn packed_texts(input: TokenStream) -> Result<TokenStream> {
+    let mut input = input.into_iter();
+    let name = input.next().ok_or("the name of the constant is missing")?;
+    let texts: Vec<TokenTree> = input.skip(1).collect();
+    let texts: Result<Vec<Vec<u8>>> = texts
+        .split(|token| is(token, ','))
+        .filter(|text| !text.is_empty())
+        .map(|text| match text {
+            [text] => letters(&literal(text)?),
+            _ => Err("one string literal after the other"),
+        })
+        .map(|letters| letters.map(String::into_bytes))
+        .collect();
+    let texts = texts?;
+    if texts
+        .iter()
+        .flatten()
+        .any(|byte| !byte.is_ascii() || *byte == b'\\')
+    {
+        return Err("only plain ASCII can be packed");
+    }
+    let Packed { pairs, texts } = Packed::new(texts);
+    let pairs = pairs.iter().map(|[a, b]| quote!([#a, #b]));
+    let lengths = texts.iter().map(|text| text.len() as u8);
+    let bytes = texts.concat();
+    Ok(quote! {
+        const #name: Packed = Packed {
+            pairs: &[#(#pairs),*],
+            bytes: &[#(#bytes),*],
+            lengths: &[#(#lengths),*],
+        };
+    })
 }
 
 fn or_error(made: Result<TokenStream>) -> proc_macro::TokenStream {
@@ -158,18 +203,23 @@ impl Words {
 }
 
 impl Line {
-    /// What stands between the quotation marks.
     fn letters(&self) -> Result<String> {
-        let text = self.words.to_string();
-        let letters = text
-            .strip_prefix('"')
-            .and_then(|text| text.strip_suffix('"'));
-        match letters {
-            None => Err("the words have to be a plain string literal"),
-            Some(letters) if letters.contains('|') => Err("`|` separates the variants"),
-            Some(letters) => Ok(letters.to_owned()),
+        let letters = letters(&self.words)?;
+        match letters.contains('|') {
+            true => Err("`|` separates the variants"),
+            false => Ok(letters),
         }
     }
+}
+
+/// What stands between the quotation marks.
+fn letters(literal: &Literal) -> Result<String> {
+    let text = literal.to_string();
+    let letters = text
+        .strip_prefix('"')
+        .and_then(|text| text.strip_suffix('"'));
+    let letters = letters.ok_or("the words have to be a plain string literal")?;
+    Ok(letters.to_owned())
 }
 
 /// `pattern => ("words", value, value),` as often as it is there.
