@@ -148,9 +148,10 @@ fn benched(bench: Bench) -> Result<()> {
         bench,
         seed: 1,
         scenario: None,
-        seconds: REALTIME_S,
+        seconds: Some(REALTIME_S),
         seeds: 1,
         accept: false,
+        document: false,
         json: false,
     };
     if bench::command(&options)? != ExitCode::SUCCESS {

@@ -220,15 +220,19 @@ pub(crate) struct BenchOptions {
     /// Of `realtime`: only this scenario [default: all of them]
     #[arg(long, value_name = "NAME")]
     pub(crate) scenario: Option<String>,
-    /// Of `realtime`: simulated seconds of motion that are looked at
-    #[arg(long, value_name = "S", default_value = "30", value_parser = seconds)]
-    pub(crate) seconds: f64,
+    /// Of `realtime` and `cycle`: simulated seconds of motion that are looked at
+    /// [default: 30 and 3]
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    pub(crate) seconds: Option<f64>,
     /// Of `realtime`: how many seeds, from --seed on
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
     pub(crate) seeds: u64,
     /// Of `instructions`: write the limits anew, a tenth above what is counted
     #[arg(long)]
     pub(crate) accept: bool,
+    /// Of `cycle`: put table and plot into docs/performance.md
+    #[arg(long)]
+    pub(crate) document: bool,
     /// One JSON object on standard output and nothing else there
     #[arg(long)]
     pub(crate) json: bool,
@@ -247,6 +251,8 @@ pub(crate) enum Bench {
     Realtime,
     /// How many instructions the hot functions take: wants Valgrind
     Instructions,
+    /// The smallest cycle that holds for 1 .. 12 axes on one bus
+    Cycle,
 }
 
 /// Severities as they are typed.

@@ -3,6 +3,7 @@
 //! functions.
 
 pub(crate) mod instructions;
+mod cycle;
 mod motion;
 pub(crate) mod realtime;
 mod sdo;
@@ -25,6 +26,10 @@ pub(crate) fn command(options: &BenchOptions) -> Result<ExitCode> {
         Bench::Sdo => sdo::run(&image()?, options.seed)?,
         Bench::Motion => motion::run(&image()?, options.seed)?,
         Bench::Instructions => instructions::run(options.accept)?,
+        Bench::Cycle => {
+            let span = Time::from_secs_f64(options.seconds.unwrap_or(CYCLE_S));
+            cycle::run(options.seed, span, options.document)?
+        }
         Bench::Realtime => realtime::run(&order(options))?,
     };
     if options.json {
@@ -40,6 +45,10 @@ pub(crate) fn command(options: &BenchOptions) -> Result<ExitCode> {
     }
     Ok(ExitCode::FAILURE)
 }
+
+/// Simulated seconds of motion that are looked at, where nobody says how many.
+const REALTIME_S: f64 = 30.0;
+const CYCLE_S: f64 = 3.0;
 
 /// The image for the machine of the project.
 fn image() -> Result<Image> {
@@ -58,7 +67,7 @@ fn order(options: &BenchOptions) -> Order {
     Order {
         scenario,
         seeds: options.seed..=last,
-        span: Time::from_secs_f64(options.seconds),
+        span: Time::from_secs_f64(options.seconds.unwrap_or(REALTIME_S)),
     }
 }
 

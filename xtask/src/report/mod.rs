@@ -3,6 +3,7 @@
 mod charts;
 mod frames;
 mod lanes;
+pub(crate) mod plot;
 mod steps;
 
 use std::fmt::Write as _;

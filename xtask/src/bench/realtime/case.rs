@@ -108,6 +108,19 @@ pub(crate) const CASES: [Case; 4] = [
     },
 ];
 
+/// What the search for the smallest cycle asks: load and SDO are no matter.
+pub(crate) const SEARCHED: Case = Case {
+    name: "search",
+    tuned: |config| answering(config, ANSWER_2MS),
+    disturbed: false,
+    limits: Limits {
+        cpu_load: None,
+        last_request_cycles: FIRST_REQUEST_CYCLES,
+        exchanges_per_s: None,
+        ..QUIET
+    },
+};
+
 fn answering(config: DriveConfig, sdo_latency: Spread) -> DriveConfig {
     DriveConfig {
         sdo_latency,

@@ -15,14 +15,14 @@ pub(crate) struct Figures {
     cycle_us: u32,
     missed: usize,
     overruns: u64,
-    pub(super) jitter_pp_us: f64,
+    pub(crate) jitter_pp_us: f64,
     /// How many SYNCs were so late, by whole microseconds.
     jitter_histogram: Vec<usize>,
     /// SYNCs that were late without a frame in their way.
     late_unexplained: usize,
     skew_us: f64,
-    load_max: f64,
-    cpu_load: f64,
+    pub(crate) load_max: f64,
+    pub(crate) cpu_load: f64,
     sync_isr_worst_cycles: u64,
     /// To the first transmit request, where there are several buses.
     sync_isr_first_cycles: u64,

@@ -4,7 +4,7 @@
 
 mod case;
 mod figures;
-mod session;
+pub(super) mod session;
 
 use std::time::Instant;
 
@@ -15,9 +15,10 @@ use serde::Serialize;
 
 use super::{Outcome, Report};
 use crate::table;
+pub(super) use case::SEARCHED;
 pub(crate) use case::{CASES, Case};
 pub(crate) use figures::Figures;
-use session::Built;
+pub(super) use session::Built;
 
 /// What is asked for.
 #[derive(Clone, Debug)]

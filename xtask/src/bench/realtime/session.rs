@@ -23,15 +23,15 @@ const LOOK: Time = Time::from_ms(20);
 const CONCISE_DCF: u16 = 0x1F22;
 
 /// What is run.
-pub(super) struct Built {
-    pub(super) image: Image,
+pub(crate) struct Built {
+    pub(crate) image: Image,
     /// SYNC and the PDOs of every cycle at worst, on the fullest bus.
-    pub(super) wire_bound_us: u32,
+    pub(crate) wire_bound_us: u32,
 }
 
 impl Built {
     /// Builds the image of a description.
-    pub(super) fn new(description: &Path) -> Result<Built> {
+    pub(crate) fn new(description: &Path) -> Result<Built> {
         let machine = Description::check(Some(description))?.machine;
         let bounds = machine
             .buses
@@ -45,7 +45,7 @@ impl Built {
 }
 
 /// Boots the machine, lets it move, and looks at `span` of it.
-pub(super) fn run(
+pub(crate) fn run(
     case: &Case,
     built: &Built,
     seed: u64,
