@@ -2,8 +2,8 @@
 //! emulated board, judged on the bus; and instructions of the library's hot
 //! functions.
 
-pub(crate) mod instructions;
 mod cycle;
+pub(crate) mod instructions;
 mod motion;
 pub(crate) mod realtime;
 mod sdo;

@@ -17,6 +17,8 @@ use crate::machine::{Checked, Description};
 
 /// All axes turn by then.
 const MOVING_BY: Time = Time::from_ms(10_000);
+/// Lines of the log that are shown when they do not.
+const LAST_WORDS: usize = 20;
 /// How often the bar is moved.
 const LOOK: Time = Time::from_ms(20);
 /// 1F22h, concise DCF: the largest objects of the board, one of each node.
@@ -59,10 +61,11 @@ pub(crate) fn run(
     bar.set_position(0);
     bar.set_message(format!("{}, seed {seed}: booting", case.name));
     if !world.run_to(MOVING_BY, World::in_full_motion) {
-        let last = world.log().last();
-        let words = last.map(|(_, line)| line.to_string()).unwrap_or_default();
-        let at = world.now();
-        bail!("the axes do not turn at {at} s; the firmware's last words: {words}");
+        let skipped = world.log().len().saturating_sub(LAST_WORDS);
+        let words = world.log().iter().skip(skipped);
+        let words: Vec<String> = words.map(|(_, line)| line.to_string()).collect();
+        let (at, words) = (world.now(), words.join("\n"));
+        bail!("the axes do not turn at {at} s; the firmware's last words:\n{words}");
     }
     world.clear_stats();
     let started = Instant::now();
