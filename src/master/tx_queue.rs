@@ -36,8 +36,11 @@ pub type Pending = [u16; 3];
 /// How many more frames other than SYNC the controller may be given.
 #[inline(always)]
 pub fn room(pending: &Pending) -> usize {
-    let [a, b, c] = pending.map(|id| usize::from(id <= ID_MAX && id != CobId::SYNC.get()));
-    SHARED_BUFFERS.saturating_sub(a + b + c)
+    const fn other(id: u16) -> usize {
+        (id <= ID_MAX && id != CobId::SYNC.get()) as usize
+    }
+    let [a, b, c] = *pending;
+    SHARED_BUFFERS.saturating_sub(other(a) + other(b) + other(c))
 }
 
 /// Whether a frame with the identifier `id` is `pending`.
