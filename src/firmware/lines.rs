@@ -54,13 +54,17 @@ impl Sender {
     }
 }
 
+const EARLY_FRAMES: usize = if EARLY { TPDOS_PER_AXIS * AXES } else { 1 };
+
 /// What waits to be sent on one bus.
 #[expect(unreachable_pub, reason = "RTIC wants shared resources to be public")]
 pub struct Line {
     /// RPDOs of every cycle that go after the TPDOs of their own cycle.
     burst: Burst<{ TPDOS_PER_AXIS * AXES }>,
     /// RPDOs of every cycle that wait for the next SYNC.
-    early: Burst<{ if EARLY { TPDOS_PER_AXIS * AXES } else { 1 } }>,
+    early: Burst<EARLY_FRAMES>,
+    /// Those that are being made meanwhile.
+    coming: Burst<EARLY_FRAMES>,
     /// The SYNC after whose TPDOs they were made.
     made_after: u32,
     /// Everything else.
@@ -80,6 +84,7 @@ impl Line {
         Line {
             burst: Burst::new(),
             early: Burst::new(),
+            coming: Burst::new(),
             made_after: 0,
             planned: TxQueue::new(),
             cycle: 0,
@@ -91,7 +96,7 @@ impl Line {
     pub(crate) fn begin(&mut self, sync: u32) {
         self.drop_late();
         if EARLY {
-            counters::RPDO_REPLACED.add(self.early.begin() as u32);
+            self.coming.begin();
         }
         self.made_after = sync;
     }
@@ -103,7 +108,7 @@ impl Line {
     /// An RPDO of every cycle, to be sent in its own or after the next SYNC.
     pub(crate) fn cyclic(&mut self, frame: Frame, early: bool) {
         if EARLY && early {
-            self.early.put(frame);
+            self.coming.put(frame);
         } else {
             self.burst.put(frame);
         }
@@ -120,6 +125,7 @@ impl Line {
     pub(crate) fn clear(&mut self) {
         self.burst.begin();
         self.early.begin();
+        self.coming.begin();
         self.planned.clear();
     }
 
@@ -134,6 +140,16 @@ impl Line {
             return None;
         }
         let syncs = SYNCS.load(Relaxed);
+        if EARLY {
+            if self.made_after != syncs && !self.coming.is_over() {
+                counters::RPDO_REPLACED.add(self.early.begin() as u32);
+                core::mem::swap(&mut self.early, &mut self.coming);
+            }
+            // Before the planned frames, which would take a buffer from them for long.
+            if !self.early.is_over() {
+                return self.early.next(pending);
+            }
+        }
         if waits && let Some(frame) = self.next_planned(bus, pending, syncs, phase) {
             return Some(frame);
         }
@@ -142,16 +158,12 @@ impl Line {
         }
         // Made too late for its own cycle, nothing is sent in the next.
         self.drop_late();
-        if EARLY {
-            self.early.next(pending)
-        } else {
-            None
-        }
+        None
     }
 
     #[inline(always)]
     fn is_empty(&self) -> bool {
-        self.planned.is_empty() && self.rpdos_are_sent()
+        self.planned.is_empty() && self.rpdos_are_sent() && (!EARLY || self.coming.is_over())
     }
 
     #[inline(always)]
@@ -161,7 +173,7 @@ impl Line {
 
     fn next_rpdo(&mut self, pending: &Pending) -> Option<Frame> {
         let early = if EARLY {
-            self.early.next(pending)
+            self.coming.next(pending)
         } else {
             None
         };
@@ -190,7 +202,12 @@ impl Line {
         let free = self.left > 1;
         let (from, until) = *derived::SDO_US.get(bus)?;
         let sdo = free || (from <= us && us < until && self.rpdos_are_sent());
-        let others = free || us < *derived::AFTER_SYNC_US.get(bus)?;
+        let until = match EARLY {
+            // After the RPDOs.
+            true => derived::TPDO_DEADLINE_US,
+            false => *derived::AFTER_SYNC_US.get(bus)?,
+        };
+        let others = free || us < until;
         let may = |id| if is_sdo(id) { sdo } else { others };
         let next = self.planned.next_of(pending, may);
         if let Some(frame) = &next
