@@ -25,7 +25,7 @@ impl<const AXES: usize> Ramps<AXES> {
     }
 
     /// The axis that gets RPDO2 in this cycle: the next whose ramps changed. If
-    /// none did, one in turn every [`AGAIN`] cycles.
+    /// none did, one in turn every 16 cycles.
     pub fn due(&mut self, commands: &[AxisCommand; AXES]) -> Option<usize> {
         self.idle = self.idle.wrapping_add(1);
         for _ in 0..AXES {
