@@ -128,7 +128,7 @@ pub(crate) const SYNC_LIMITS: SyncLimits = SyncLimits {
 /// Frames that may wait for a transmit buffer.
 pub(crate) const TX_QUEUE: usize = design::tx_queue(AXES);
 
-static STEPS: [Step<AXES>; 3] = experiment::steps(&generated::MOTORS);
+static STEPS: [Step<AXES>; 3] = experiment::steps(&generated::MOTORS, NETWORK.cycle);
 
 /// The axes and their program.
 pub(crate) static GROUP: GroupConfig<AXES> = experiment::group(

@@ -2,13 +2,17 @@
 
 use crate::{
     frame::Frame,
-    id::{CobId, FunctionCode},
+    id::{CobId, FunctionCode, NodeId},
 };
 use heapless::Vec;
 
 /// The buffers that frames other than SYNC may occupy. A third stays free, so
 /// that a SYNC never waits for more than the frame on the wire.
 const SHARED_BUFFERS: usize = 2;
+/// The identifiers of SDO begin here.
+const SDO: u16 = FunctionCode::SdoResponse.base();
+/// The bits of an identifier that tell its function.
+const FUNCTION: u16 = !(NodeId::MAX.get() as u16);
 /// The largest identifier.
 const ID_MAX: u16 = 0x7FF;
 
@@ -51,18 +55,28 @@ pub fn holds(pending: &Pending, id: CobId) -> bool {
     a == id || b == id || c == id
 }
 
+/// Whether it is a heartbeat's or guarding's.
+const fn is_error_control(id: u16) -> bool {
+    id & FUNCTION == FunctionCode::ErrorControl.base()
+}
+
 /// How urgent an identifier is: the lower, the more. Heartbeats come next to NMT:
 /// they are rare, and the drives stop without the master's, however much else
-/// there is to send.
-fn rank(id: CobId) -> u16 {
-    match id.split() {
-        Some((FunctionCode::ErrorControl, _)) => CobId::NMT.get() + 1,
-        _ => id.get(),
+/// there is to send. SDO requests are all alike, or those to the highest node-IDs
+/// would wait for longer than their timeout while the bus is full of the others.
+const fn rank(id: CobId) -> u16 {
+    let id = id.get();
+    if is_error_control(id) {
+        CobId::NMT.get() + 1
+    } else if id >= SDO {
+        id & FUNCTION
+    } else {
+        id
     }
 }
 
-/// A queue of up to `N` frames, heartbeats first but for NMT, then the lowest
-/// identifier, first in first out among equal ones.
+/// A queue of up to `N` frames: heartbeats first but for NMT, then the lowest
+/// identifier; SDO requests and equal identifiers first in, first out.
 #[derive(Debug, Default)]
 pub struct TxQueue<const N: usize> {
     /// The most urgent frame last.
@@ -127,6 +141,11 @@ impl<const N: usize> TxQueue<N> {
     /// `None` if two frames other than SYNC are there already, or if nothing
     /// waits but identifiers that are: the controller does not keep the order of
     /// equal identifiers, so it gets the next only when the last has left.
+    ///
+    /// While a heartbeat is in a buffer, SDO waits here: on a bus full of it no
+    /// heartbeat, which has the lowest priority of all, would get through. Once
+    /// the answers under way are over, the master's does and, being the last,
+    /// lets those of the nodes pass before.
     pub fn next(&mut self, pending: &Pending) -> Option<Frame> {
         self.next_of(pending, |_| true)
     }
@@ -136,9 +155,11 @@ impl<const N: usize> TxQueue<N> {
         if room(pending) == 0 {
             return None;
         }
+        let [a, b, c] = *pending;
+        let beating = is_error_control(a) || is_error_control(b) || is_error_control(c);
         let position = self.frames.iter().rposition(|queued| {
             let id = queued.id();
-            may(id) && !holds(pending, id)
+            may(id) && !holds(pending, id) && !(beating && id.get() >= SDO)
         })?;
         Some(self.frames.remove(position))
     }
@@ -180,6 +201,25 @@ mod tests {
     fn next<const N: usize>(queue: &mut TxQueue<N>, pending: &Pending) -> Option<(u16, u8)> {
         let frame = queue.next(pending)?;
         Some((frame.id().get(), frame.data()[0]))
+    }
+
+    #[test]
+    fn heartbeats_come_next_to_nmt_and_sdo_waits_until_they_are_sent() {
+        let mut queue = TxQueue::<8>::new();
+        for id in [0x602, 0x601, 0x5FF, 0x201, 0x77F, 0x000] {
+            queue.put(frame(id, 0)).unwrap();
+        }
+        assert_eq!(next(&mut queue, &NONE), Some((0x000, 0)));
+        assert_eq!(next(&mut queue, &NONE), Some((0x77F, 0)));
+        let heartbeat = [0x77F, FREE, FREE];
+        assert_eq!(next(&mut queue, &heartbeat), Some((0x201, 0)));
+        assert_eq!(next(&mut queue, &heartbeat), None);
+        // LSS makes pauses by itself.
+        let lss = [FREE, 0x7E5, FREE];
+        assert_eq!(next(&mut queue, &lss), Some((0x5FF, 0)));
+        // Whoever came first.
+        assert_eq!(next(&mut queue, &NONE), Some((0x602, 0)));
+        assert_eq!(next(&mut queue, &NONE), Some((0x601, 0)));
     }
 
     #[test]

@@ -101,6 +101,8 @@ const VELOCITY_MAX: u32 = 2200;
 const STOP_DECELERATION: u32 = 3000;
 /// Twice the steepest ramp of the program, rpm/s.
 const ACCELERATION_MAX: u32 = 4000;
+/// The drives' velocity loops take that long, microseconds; a longer cycle is long.
+const LONG_US: u32 = 10_000;
 /// Turns of the motor from home.
 const TRAVEL_MAX: u32 = 1000;
 
@@ -152,7 +154,11 @@ const fn pair(axis: usize, axes: usize) -> u8 {
 }
 
 /// One move of all axes.
-const fn step<const N: usize>(motors: &[Motor; N], parts: &[Part; PAIRS as usize]) -> Step<N> {
+const fn step<const N: usize>(
+    motors: &[Motor; N],
+    cycle: Duration,
+    parts: &[Part; PAIRS as usize],
+) -> Step<N> {
     let [first, second, third] = parts;
     let mut moves = [None; N];
     let mut axis = 0;
@@ -168,6 +174,7 @@ const fn step<const N: usize>(motors: &[Motor; N], parts: &[Part; PAIRS as usize
         };
         let speed = least(VELOCITY_MAX, motor.max_speed);
         let ramp = least(ACCELERATION_MAX, motor.max_acceleration) / 2;
+        let ramp = least(ramp, steepest(cycle));
         *part = Some(AxisMove {
             target: motor.target(*turns),
             velocity: least(*velocity, speed - speed / 6),
@@ -182,12 +189,23 @@ const fn step<const N: usize>(motors: &[Motor; N], parts: &[Part; PAIRS as usize
 }
 
 /// There, a pause, and back; see the module.
-pub const fn steps<const N: usize>(motors: &[Motor; N]) -> [Step<N>; 3] {
+pub const fn steps<const N: usize>(motors: &[Motor; N], cycle: Duration) -> [Step<N>; 3] {
     [
-        step(motors, &THERE),
+        step(motors, cycle, &THERE),
         Step::Dwell(DWELL),
-        step(motors, &BACK),
+        step(motors, cycle, &BACK),
     ]
+}
+
+/// The steepest ramp, rpm/s. In a long cycle the speed changes by so little in one
+/// that the position loop, which sees it a cycle later, keeps up.
+const fn steepest(cycle: Duration) -> u32 {
+    const RPM_PER_CYCLE: u32 = 12;
+    const US_PER_S: u32 = 1_000_000;
+    match cycle.as_micros() {
+        0..=LONG_US => ACCELERATION_MAX,
+        us => RPM_PER_CYCLE * US_PER_S / us,
+    }
 }
 
 /// How much steeper than the reference the drive's ramps are: at cycles up to 10 ms
@@ -196,7 +214,6 @@ pub const fn steps<const N: usize>(motors: &[Motor; N]) -> [Step<N>; 3] {
 const fn ramp_percent(cycle: Duration) -> u32 {
     const WHOLE: u32 = 100;
     const MORE: u32 = 50;
-    const LONG_US: u32 = 10_000;
     let us = cycle.as_micros();
     WHOLE + MORE * LONG_US / if us > LONG_US { us } else { LONG_US }
 }
@@ -238,12 +255,9 @@ pub const fn group<const N: usize>(
     }
 }
 
-static SAMPLE_STEPS: [Step<6>; 3] = steps(&[Motor::SAMPLE; 6]);
+const SAMPLE_CYCLE: Duration = Duration::from_millis(10);
+
+static SAMPLE_STEPS: [Step<6>; 3] = steps(&[Motor::SAMPLE; 6], SAMPLE_CYCLE);
 
 /// The group of six axes of the sample network, at a cycle of 10 ms.
-pub static GROUP: GroupConfig<6> = group(
-    &[Motor::SAMPLE; 6],
-    Duration::from_millis(10),
-    3,
-    &SAMPLE_STEPS,
-);
+pub static GROUP: GroupConfig<6> = group(&[Motor::SAMPLE; 6], SAMPLE_CYCLE, 3, &SAMPLE_STEPS);

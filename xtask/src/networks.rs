@@ -18,15 +18,9 @@ use crate::{cargo, new, run};
 const AXES: [u8; 4] = [1, 3, 6, 12];
 /// bit/s
 const BIT_RATES: [u32; 3] = [125_000, 500_000, 1_000_000];
-/// A bus that is full while its drives are configured, and how often they send
-/// their heartbeats there.
-const SLOW: u32 = 125_000;
-const SLOW_HEARTBEAT_MS: u32 = 500;
-/// A cycle that steep ramps are too long for, and the acceleration then, rpm/s.
-const LONG_US: u32 = 50_000;
-const GENTLE: u32 = 400;
 /// Where the sample's nodes begin.
 const NODES: &str = "[[node]]";
+const PER_KILO: u32 = 1000;
 /// Cycles are whole milliseconds: 60C2h has that unit.
 const MS_US: u32 = 1000;
 /// The serial number of the first drive is the one after this.
@@ -100,7 +94,7 @@ pub(crate) fn good(record: &Record) -> Result<()> {
 impl Variant {
     /// In words.
     pub(crate) fn name(&self) -> String {
-        let kilobits = self.bit_rate / MS_US;
+        let kilobits = self.bit_rate / PER_KILO;
         let mapped = if self.remapped { ", other mapping" } else { "" };
         let drives = counted(self.axes.into(), "drive");
         format!("{drives} at {kilobits} kbit/s{mapped}")
@@ -162,24 +156,14 @@ impl Variant {
         let common = sample.split(NODES).next().unwrap_or_default();
         let mut text = String::new();
         let mut skip = false;
-        let mut in_device = false;
         for line in common.lines() {
             let key = line.split('=').next().unwrap_or_default().trim();
-            in_device |= key.starts_with("[device");
             match key {
                 "bit_rate" => {
                     let _ = writeln!(text, "bit_rate = {}", self.bit_rate);
                 }
                 "cycle_us" => {
                     let _ = writeln!(text, "cycle_us = {cycle_us}");
-                }
-                // Heartbeats come last on a slow bus that is full of SDO.
-                "heartbeat_ms" if self.bit_rate == SLOW && in_device => {
-                    let _ = writeln!(text, "heartbeat_ms = {SLOW_HEARTBEAT_MS}");
-                }
-                // In a long cycle a steep ramp goes too far.
-                "max_acceleration" if cycle_us > LONG_US => {
-                    let _ = writeln!(text, "max_acceleration = {GENTLE}");
                 }
                 // They follow from the others.
                 "tpdo_deadline_us" | "guard_us" => skip = true,

@@ -174,7 +174,7 @@ type Moves = (Vec<Vec<Option<Part>>>, Option<Time>);
 fn program(motors: &[Motor], cycle: Duration) -> Option<Moves> {
     fn of<const N: usize>(motors: &[Motor], cycle: Duration) -> Option<Moves> {
         let motors: &[Motor; N] = motors.try_into().ok()?;
-        let steps: &'static [Step<N>] = Box::leak(Box::new(experiment::steps(motors)));
+        let steps: &'static [Step<N>] = Box::leak(Box::new(experiment::steps(motors, cycle)));
         let group = experiment::group(motors, cycle, u8::MAX, steps);
         let duration = group.program.duration(&group).ok();
         Some((moves(steps), duration.map(Time::from)))
