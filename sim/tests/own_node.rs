@@ -49,6 +49,13 @@ fn all_enabled(world: &World<'_>) -> bool {
     world.statuses().flatten().all(|status| enabled(&status))
 }
 
+/// The SYNC periods that the description allows.
+fn described_cycles() -> std::ops::RangeInclusive<u32> {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../network.toml");
+    let outcome = canmaster_network::load(file.as_ref());
+    outcome.machine.unwrap().cycles()
+}
+
 fn at(index: u16, sub: u8) -> Address {
     Address::new(index, sub)
 }
@@ -308,13 +315,15 @@ fn pdos_of_wrong_length_are_told() {
 #[test]
 fn the_sync_follows_1005h_1006h_and_1019h_in_pre_operational() {
     let mut client = alone(41);
-    refused(client.put(0x1006, 0, 65_536, 4), AbortCode::VALUE_TOO_HIGH);
-    // The smallest cycle that the check of network.toml lets through with its
-    // deadline of the TPDOs.
-    refused(client.put(0x1006, 0, 6_024, 4), AbortCode::VALUE_TOO_LOW);
-    client.put(0x1006, 0, 6_025, 4).unwrap();
-    client.put(0x1006, 0, 10_000, 4).unwrap();
-    refused(client.put(0x1007, 0, 6_024, 4), AbortCode::VALUE_TOO_LOW);
+    // What the check of network.toml lets through, to the microsecond.
+    let (shortest, longest) = described_cycles().into_inner();
+    let put = |client: &mut Client<'_>, us: u32| client.put(0x1006, 0, us, 4);
+    refused(put(&mut client, shortest - 1), AbortCode::VALUE_TOO_LOW);
+    refused(put(&mut client, longest + 1), AbortCode::VALUE_TOO_HIGH);
+    for us in [shortest, longest, 10_000] {
+        put(&mut client, us).unwrap();
+    }
+    refused(client.put(0x1007, 0, 5_000, 4), AbortCode::VALUE_TOO_LOW);
     refused(client.put(0x1007, 0, 10_001, 4), AbortCode::VALUE_TOO_HIGH);
     refused(client.put(0x1019, 0, 3, 1), AbortCode::DEVICE_STATE);
     client.put(0x1006, 0, 0, 4).unwrap();
