@@ -99,6 +99,8 @@ impl Motor {
 const VELOCITY_MAX: u32 = 2200;
 /// Of a stop, if the motors can, rpm/s.
 const STOP_DECELERATION: u32 = 3000;
+/// The drives' ramps at least, rpm/s.
+const RAMP_MIN: u32 = 1000;
 /// Twice the steepest ramp of the program, rpm/s.
 const ACCELERATION_MAX: u32 = 4000;
 /// The drives' velocity loops take that long, microseconds; a longer cycle is long.
@@ -251,7 +253,8 @@ pub const fn group<const N: usize>(
         settle_cycles: 5,
         settle_timeout: Duration::from_millis(2000),
         ramp_percent: ramp_percent(cycle),
-        ramp_min: 1000,
+        // No more than the group's own ramps need, or a long cycle overshoots.
+        ramp_min: least(RAMP_MIN, 2 * steepest(cycle)),
     }
 }
 
