@@ -170,6 +170,9 @@ pub(crate) struct CheckOptions {
     /// The description [default: network.toml of this project]
     #[arg(value_name = "FILE")]
     pub(crate) file: Option<PathBuf>,
+    /// One JSON object on standard output and nothing else there
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 #[derive(Args, Clone, Debug)]

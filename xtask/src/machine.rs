@@ -69,6 +69,8 @@ pub(crate) struct Checked {
     /// `None`: that of the project.
     path: Option<PathBuf>,
     pub(crate) machine: Machine,
+    /// Its buses with their cycles laid out.
+    pub(crate) buses: Vec<model::Bus>,
 }
 
 impl Checked {
@@ -79,8 +81,13 @@ impl Checked {
             Some(file) => Some(std::path::absolute(file).context("no current folder")?),
             None => None,
         };
-        let machine = Machine::new(&Description::check(file)?.machine)?;
-        Ok(Checked { path, machine })
+        let described = Description::check(file)?.machine;
+        let machine = Machine::new(&described)?;
+        Ok(Checked {
+            path,
+            machine,
+            buses: described.buses,
+        })
     }
 
     /// The axes that the firmware leads.

@@ -3,12 +3,14 @@
 mod charts;
 mod frames;
 mod lanes;
+pub(crate) mod layout;
 pub(crate) mod plot;
 mod steps;
 
 use std::fmt::Write as _;
 
 use anyhow::Result;
+use canmaster_network::model::Bus;
 use canmaster_sim::judge::Outcome;
 use canmaster_sim::world::{BusRecord, Record};
 
@@ -30,7 +32,7 @@ svg{display:block;margin:.3rem 0}
 footer{margin:2.5rem 0;color:#666;font-size:.9rem}";
 
 /// The whole page.
-pub(crate) fn html(record: &Record, summary: &Summary) -> Result<String> {
+pub(crate) fn html(record: &Record, summary: &Summary, laid_out: &[Bus]) -> Result<String> {
     let mut page = String::new();
     let title = format!("canmaster: run with seed {}", record.seed);
     write!(
@@ -41,6 +43,13 @@ pub(crate) fn html(record: &Record, summary: &Summary) -> Result<String> {
     )?;
     verdict(&mut page, record)?;
     axes(&mut page, record)?;
+    write!(
+        page,
+        "<h2>The cycle as it is laid out</h2>\n<p>At worst: every frame with the most stuff bits, \
+         every drive as slow as it may be. The red line is when SDO requests may be handed over, \
+         where they are planned.</p>\n{}\n",
+        layout::picture(laid_out)?
+    )?;
     for bus in &record.buses {
         bus_cycle(&mut page, record, bus)?;
     }

@@ -54,7 +54,7 @@ pub(crate) fn command(options: &RunOptions) -> Result<ExitCode> {
         eprintln!("board: {complaint}");
     }
     let summary = Summary::new(&record, &size, started.elapsed());
-    let mut files = output::write(&record, &summary)?;
+    let mut files = output::write(&record, &summary, &checked.buses)?;
     if let Some(path) = &options.picture {
         files.push(output::save(path, report::picture(&record)?.as_bytes())?);
     }

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Context, Result};
+use canmaster_network::model::Bus;
 use canmaster_sim::bus::WireRecord;
 use canmaster_sim::bus::log::write_candump;
 use canmaster_sim::world::Record;
@@ -14,12 +15,12 @@ use crate::{cli, report};
 const INTERFACE: &str = "can";
 
 /// Writes them and says where they are.
-pub(super) fn write(record: &Record, summary: &Summary) -> Result<Vec<String>> {
+pub(super) fn write(record: &Record, summary: &Summary, laid_out: &[Bus]) -> Result<Vec<String>> {
     let directory = cli::results_dir();
     std::fs::create_dir_all(&directory)
         .with_context(|| format!("cannot create {}", directory.display()))?;
     let log = bus_log(record)?;
-    let page = report::html(record, summary)?.into_bytes();
+    let page = report::html(record, summary, laid_out)?.into_bytes();
     [("bus.log", log), ("report.html", page)]
         .into_iter()
         .map(|(name, content)| save(&directory.join(name), &content))

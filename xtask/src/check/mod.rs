@@ -1,5 +1,7 @@
 //! `cargo xtask check`: whether a machine can work, and what follows from it.
 
+mod json;
+
 use std::fs;
 use std::path::Path;
 use std::process::ExitCode;
@@ -11,7 +13,7 @@ use canmaster_network::model::{Bus, Machine};
 
 use crate::cli::CheckOptions;
 use crate::machine::{Description, counted};
-use crate::{board_eds, cargo, library, table};
+use crate::{board_eds, cargo, library, report, table};
 
 /// Letters of the picture of a cycle.
 const WIDTH: usize = 72;
@@ -34,11 +36,16 @@ const ROWS: [(SlotKind, &str); 8] = [
 pub(crate) fn command(options: &CheckOptions) -> Result<ExitCode> {
     let checked = Description::check(options.file.as_deref())?;
     let machine = &checked.machine;
+    let folder = cargo::workspace().join("target").join("network");
+    derived(machine, &folder)?;
+    if options.json {
+        let report = json::Report::new(machine, checked.warnings);
+        println!("{}", serde_json::to_string(&report)?);
+        return Ok(ExitCode::SUCCESS);
+    }
     for bus in &machine.buses {
         show(bus);
     }
-    let folder = cargo::workspace().join("target").join("network");
-    derived(machine, &folder)?;
     println!(
         "{}: {}, {}; derived files are in {}",
         checked.path.display(),
@@ -91,6 +98,7 @@ fn show(bus: &Bus) {
     table::align_right(&mut cycle, &[1, 2, 3, 4]);
     println!("{cycle}\n{}", picture(layout, WIDTH));
     println!("{}", summary(layout));
+    println!("{}", plan(layout));
     let (shortest, longest) = bus.cycles().into_inner();
     println!("1006h may be written {shortest} .. {longest} us\n");
 }
@@ -114,6 +122,32 @@ fn summary(layout: &Layout) -> String {
     )
 }
 
+/// When RPDOs and SDO requests go.
+fn plan(layout: &Layout) -> String {
+    let demand = &layout.demand;
+    let mut words = format!(
+        "RPDOs {}: {} us from the values of a TPDO to the RPDO that acts; SYNC and PDOs alone take \
+         {} us",
+        json::order(demand.order),
+        layout.dead_time_us(),
+        demand.wire_bound_us()
+    );
+    if let Some(window) = layout.sdo_window()
+        && demand.is_planned()
+    {
+        let answer = if window.next_cycle {
+            "answers in the next cycle"
+        } else {
+            "answers in the same cycle"
+        };
+        words.push_str(&format!(
+            "\nSDO requests {} .. {} us after SYNC, {answer}",
+            window.from_us, window.until_us
+        ));
+    }
+    words
+}
+
 /// Writes what follows from the machine.
 fn derived(machine: &Machine, folder: &Path) -> Result<()> {
     let write = |name: String, bytes: &[u8]| {
@@ -127,6 +161,8 @@ fn derived(machine: &Machine, folder: &Path) -> Result<()> {
         let eds = board_eds::eds(machine, place, network);
         write(format!("{}-master.eds", bus.name), eds.write().as_bytes())?;
     }
+    let cycle = report::layout::picture(&machine.buses)?;
+    write("cycle.svg".to_string(), cycle.as_bytes())?;
     for node in &machine.nodes {
         let bytes = concise_dcf(&machine.master, node);
         write(format!("node-{}.dcf.bin", node.id), &bytes)?;
