@@ -53,6 +53,22 @@ fn the_sample_is_checked_and_its_files_are_derived() {
 }
 
 #[test]
+fn the_layout_of_every_bus_is_one_json_object() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../networks/two_bus_1ms.toml");
+    let assert = xtask().args(["check", "--json"]).arg(file).assert().code(0);
+    let text = String::from_utf8_lossy(&assert.get_output().stdout).into_owned();
+    let report: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let buses = report["buses"].as_array().unwrap();
+    assert_eq!(buses.len(), 2);
+    for bus in buses {
+        assert_eq!(bus["rpdos"], "after SYNC");
+        assert_eq!(bus["wire_bound_us"], 745);
+        assert_eq!(bus["sdo"]["until_us"], 845);
+        assert_eq!(bus["slots"][0]["kind"], "sync");
+    }
+}
+
+#[test]
 fn a_machine_from_the_sample_is_all_right_until_it_is_broken() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path().join("mine");
