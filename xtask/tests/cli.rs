@@ -1,6 +1,6 @@
 //! The commands as they are typed.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
 use serde_json::Value;
@@ -57,7 +57,7 @@ fn the_layout_of_every_bus_is_one_json_object() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../networks/two_bus_1ms.toml");
     let assert = xtask().args(["check", "--json"]).arg(file).assert().code(0);
     let text = String::from_utf8_lossy(&assert.get_output().stdout).into_owned();
-    let report: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let report: Value = serde_json::from_str(&text).unwrap();
     let buses = report["buses"].as_array().unwrap();
     assert_eq!(buses.len(), 2);
     for bus in buses {
