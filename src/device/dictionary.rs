@@ -1,9 +1,10 @@
 //! The dictionary itself: the values and the state behind its entries.
 
-use super::node_record::{NodeRecord, NodeStatus};
+use super::node_record::{NodeRecord, NodeStatus, Presence};
 use super::settings::{Setting, Settings, nodes};
 use super::transfer::TransferTest;
 use super::{Board, Description, Event};
+use crate::boot;
 use crate::emcy;
 use crate::id::NodeId;
 use crate::network::{Network, Node};
@@ -131,19 +132,27 @@ impl<const N: usize> Dictionary<N> {
     }
 
     /// Takes note of a step of the boot-up.
-    pub(super) fn on_boot_event(&mut self, event: &crate::boot::Event) {
+    pub(super) fn on_boot_event(&mut self, event: &boot::Event) {
         let Some(status) = NodeStatus::after(event) else {
             return;
         };
-        let (first, count) = match event.node() {
-            Some(node) => match self.network.find(node) {
-                Some((place, _)) => (place, 1),
-                None => return,
-            },
-            None => (0, usize::from(nodes::<N>(self.network))),
+        let Some(node) = event.node() else {
+            let nodes = usize::from(nodes::<N>(self.network));
+            for record in self.nodes.iter_mut().take(nodes) {
+                record.status = status;
+            }
+            return;
         };
-        for record in self.nodes.iter_mut().skip(first).take(count) {
-            record.step(status);
+        let Some(record) = self.record(node) else {
+            return;
+        };
+        record.status = status;
+        // A node that was never heard counts as lost when its boot time is over.
+        if let boot::Event::Failed(_, failure) = event
+            && failure.cause == boot::Cause::NoBootUp
+            && record.presence == Presence::Unknown
+        {
+            record.presence = Presence::Missing;
         }
     }
 }

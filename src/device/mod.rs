@@ -309,14 +309,14 @@ impl<const N: usize> Device<N> {
         if !state.allows(Service::Sdo) {
             return None;
         }
-        let before = self.time_parameters();
+        let before = self.time_period();
         let view = &mut View {
             dictionary: &mut self.dictionary,
             board,
             now,
         };
         let answer = self.server.on_frame(frame, now, view);
-        if self.time_parameters() != before {
+        if self.time_period() != before {
             self.start_time(now);
         }
         answer
@@ -365,18 +365,17 @@ impl<const N: usize> Device<N> {
         next.deadline()
     }
 
-    /// Whether TIME is produced, and how often.
-    fn time_parameters(&self) -> (bool, Duration) {
+    /// How often TIME is produced; zero: not at all.
+    fn time_period(&self) -> Duration {
         let settings = &self.dictionary.settings;
-        (settings.time_cob_id().is_producer(), settings.time_period())
+        match settings.time_cob_id().is_producer() {
+            true => settings.time_period(),
+            false => Duration::ZERO,
+        }
     }
 
     fn start_time(&mut self, now: Instant) {
-        let period = match self.time_parameters() {
-            (true, period) => period,
-            (false, _) => Duration::ZERO,
-        };
-        self.time.set_period(period, now);
+        self.time.set_period(self.time_period(), now);
     }
 
     fn on_time(&mut self, frame: &Frame, now: Instant) {

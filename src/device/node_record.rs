@@ -1,7 +1,7 @@
 //! What the master knows of a node: boot-up, NMT state, emergencies.
 
 use super::window::Window;
-use crate::boot::{Cause, Event, Failure, Status};
+use crate::boot::{Cause, Event, Status};
 use crate::emcy::{Emcy, History};
 use crate::nmt::State;
 
@@ -37,7 +37,13 @@ pub enum NodeStatus {
     /// It was booted and is not what it should be: it is booted again.
     Lost,
     /// It was given up.
-    Failed(Failure),
+    Failed {
+        /// The letter of CiA 302-2.
+        status: Status,
+        /// The cause without its facts: those are in the log, whose words take no
+        /// room in the device.
+        words: &'static str,
+    },
 }
 
 impl NodeStatus {
@@ -53,11 +59,14 @@ impl NodeStatus {
             Event::Operational(_) | Event::NodeBack(_) => NodeStatus::Operational,
             Event::LeftRunning(_) => NodeStatus::LeftRunning,
             Event::NodeLost(_) => NodeStatus::Lost,
-            Event::NotListed(_) => NodeStatus::Failed(Failure {
+            Event::NotListed(_) => NodeStatus::Failed {
                 status: Status::A,
-                cause: Cause::NotListed,
-            }),
-            Event::Failed(_, failure) => NodeStatus::Failed(failure),
+                words: words(&Cause::NotListed),
+            },
+            Event::Failed(_, ref failure) => NodeStatus::Failed {
+                status: failure.status,
+                words: words(&failure.cause),
+            },
             _ => return None,
         })
     }
@@ -76,8 +85,8 @@ impl NodeStatus {
     /// The error status of CiA 302-2 as an ASCII letter; 0 for none.
     pub const fn letter(&self) -> u8 {
         match self {
-            NodeStatus::Failed(failure) => failure.status.letter() as u8,
-            NodeStatus::LeftRunning => Status::L.letter() as u8,
+            NodeStatus::Failed { status, .. } => *status as u8,
+            NodeStatus::LeftRunning => Status::L as u8,
             _ => 0,
         }
     }
@@ -96,7 +105,7 @@ impl NodeStatus {
             NodeStatus::Operational => "operational",
             NodeStatus::LeftRunning => "was operational already and is left running",
             NodeStatus::Lost => "lost, to be booted again",
-            NodeStatus::Failed(failure) => words(&failure.cause),
+            NodeStatus::Failed { words, .. } => words,
         });
         match *self {
             NodeStatus::Configuring { done, total } => {
@@ -107,9 +116,9 @@ impl NodeStatus {
                 }
                 window.text(" writes");
             }
-            NodeStatus::Failed(failure) => {
+            NodeStatus::Failed { status, .. } => {
                 window.text(" (boot status ");
-                window.put(&[failure.status as u8]);
+                window.put(&[status as u8]);
                 window.text(")");
             }
             _ => {}
@@ -117,8 +126,6 @@ impl NodeStatus {
     }
 }
 
-/// The cause without its facts: those are in the log, whose words take no room in
-/// the device.
 const fn words(cause: &Cause) -> &'static str {
     match cause {
         Cause::NotListed => "not in the list of this master",
@@ -140,19 +147,6 @@ pub(super) struct NodeRecord {
     pub(super) status: NodeStatus,
     pub(super) presence: Presence,
     pub(super) emcy: History<Emcy, HISTORY>,
-}
-
-impl NodeRecord {
-    /// Takes note of a step of the boot-up. A node that was never heard counts as
-    /// lost when its boot time is over.
-    pub(super) fn step(&mut self, status: NodeStatus) {
-        self.status = status;
-        if let (NodeStatus::Failed(failure), Presence::Unknown) = (status, self.presence)
-            && failure.cause == Cause::NoBootUp
-        {
-            self.presence = Presence::Missing;
-        }
-    }
 }
 
 /// Whether error control hears the node.

@@ -59,16 +59,21 @@ impl Mirrored {
 
     /// The entry `n` of the mapping, counted from 1.
     pub(super) fn mapped(&self, n: u8) -> Option<MappingEntry> {
-        let mut left = n;
-        let (field, process) = field(self.node, &mut |_, field| {
-            if field.direction == self.direction && field.number == self.pdo.number {
-                left = left.saturating_sub(1);
-                return left == 0;
+        let place = usize::from(n).checked_sub(1)?;
+        let bits = self.pdo.mapping.get(place)?.bits();
+        // The fields of the PDOs before this one.
+        let mut before = match self.direction {
+            Direction::Transmit => 0,
+            Direction::Receive => fields(self.node.tpdos),
+        };
+        for pdo in pdos(self.node, self.direction) {
+            if pdo.number == self.pdo.number {
+                break;
             }
-            false
-        })?;
+            before += pdo.mapping.len();
+        }
         let at = index::PROCESS + u16::from(self.node.id.get());
-        Some(MappingEntry::new(at, field, process.bits))
+        Some(MappingEntry::new(at, (before + usize::from(n)) as u8, bits))
     }
 }
 
@@ -86,19 +91,32 @@ pub(super) struct Process {
 }
 
 impl Process {
-    /// The field of a node with this number, counted from 1.
+    /// The field of a node with this number, counted from 1: first everything
+    /// that the node sends, then what it receives.
     pub(super) fn find(node: &'static Node, number: u8) -> Option<Process> {
-        field(node, &mut |n, _| n == number).map(|(_, process)| process)
+        let mut left = usize::from(number).checked_sub(1)?;
+        for direction in [Direction::Transmit, Direction::Receive] {
+            for pdo in pdos(node, direction) {
+                if let Some((before, [entry, ..])) = pdo.mapping.split_at_checked(left) {
+                    return Some(Process {
+                        node: node.id,
+                        direction,
+                        number: pdo.number,
+                        first_bit: before
+                            .iter()
+                            .fold(0, |bits, entry| entry.bits().saturating_add(bits)),
+                        bits: entry.bits(),
+                    });
+                }
+                left -= pdo.mapping.len();
+            }
+        }
+        None
     }
 
     /// How many fields a node has.
-    pub(super) fn count(node: &'static Node) -> u8 {
-        let mut count = 0;
-        field(node, &mut |n, _| {
-            count = n;
-            false
-        });
-        count
+    pub(super) fn count(node: &Node) -> u8 {
+        (fields(node.tpdos) + fields(node.rpdos)) as u8
     }
 
     pub(super) const fn data_type(&self) -> DataType {
@@ -124,33 +142,9 @@ impl Process {
     }
 }
 
-/// Goes through everything that a node sends and receives, in the order of the
-/// sub-indices, to the first field that is wanted.
-fn field(
-    node: &'static Node,
-    wanted: &mut dyn FnMut(u8, &Process) -> bool,
-) -> Option<(u8, Process)> {
-    let mut n = 0_u8;
-    for direction in [Direction::Transmit, Direction::Receive] {
-        for pdo in pdos(node, direction) {
-            let mut first_bit = 0_u8;
-            for entry in pdo.mapping {
-                let process = Process {
-                    node: node.id,
-                    direction,
-                    number: pdo.number,
-                    first_bit,
-                    bits: entry.bits(),
-                };
-                n = n.saturating_add(1);
-                if wanted(n, &process) {
-                    return Some((n, process));
-                }
-                first_bit = first_bit.saturating_add(entry.bits());
-            }
-        }
-    }
-    None
+/// How many fields these PDOs have.
+fn fields(pdos: &[Pdo]) -> usize {
+    pdos.iter().map(|pdo| pdo.mapping.len()).sum()
 }
 
 const fn pdos(node: &Node, direction: Direction) -> &'static [Pdo] {

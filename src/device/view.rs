@@ -174,7 +174,9 @@ impl<B: Board, const N: usize> ObjectDictionary for View<'_, B, N> {
 
     fn set(&mut self, at: Address, value: Value) -> Result<(), AbortCode> {
         let dictionary = &mut *self.dictionary;
-        let number = value.as_u32();
+        let [a, b, c, d, e, f, ..] = value.padded();
+        // No entry that can be written is signed.
+        let number = u32::from_le_bytes([a, b, c, d]);
         let found = dictionary.find(at)?;
         // 80h, all nodes, is not a node-ID.
         let node = found.node;
@@ -203,8 +205,8 @@ impl<B: Board, const N: usize> ObjectDictionary for View<'_, B, N> {
             }
             Item::TransferTest => return dictionary.set_transfer_word(found.n(), number),
             Item::Clock => {
-                let bytes = value.bytes().try_into().map_err(|_| AbortCode::GENERAL)?;
-                let time = TimeOfDay::decode(bytes).ok_or(AbortCode::VALUE_RANGE)?;
+                let time = TimeOfDay::decode([a, b, c, d, e, f]);
+                let time = time.ok_or(AbortCode::VALUE_RANGE)?;
                 dictionary.clock.set(time, self.now);
             }
             _ => return Err(AbortCode::READ_ONLY),

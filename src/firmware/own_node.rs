@@ -252,16 +252,16 @@ impl OwnNode {
     #[inline(never)]
     pub(crate) fn boot(&mut self, event: &Event) {
         self.device.on_boot_event(event);
-        if let Event::Failed(node, failure) = *event {
-            let letter = failure.status.letter() as u8;
-            self.device.raise(MasterError::BootFailed { node, letter });
-        }
-        if let Event::Operational(node) | Event::NodeBack(node) = *event {
-            let code = MasterError::BOOT_FAILED;
-            self.device.clear_all(code, Some(node));
-            self.device.clear(MasterError::NodeLost { node });
-        }
         match *event {
+            Event::Failed(node, ref failure) => {
+                let letter = failure.status as u8;
+                self.device.raise(MasterError::BootFailed { node, letter });
+            }
+            Event::Operational(node) | Event::NodeBack(node) => {
+                let code = MasterError::BOOT_FAILED;
+                self.device.clear_all(code, Some(node));
+                self.device.clear(MasterError::NodeLost { node });
+            }
             Event::NodeLost(node) => self.device.raise(MasterError::NodeLost { node }),
             Event::BusOff { .. } => self.device.set_sync_producer(false),
             _ => {}

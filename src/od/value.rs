@@ -94,8 +94,8 @@ impl Value {
             return Err(AbortCode::TOO_SHORT);
         }
         let mut bytes = [0; VALUE_MAX];
-        for (to, from) in bytes.iter_mut().zip(data) {
-            *to = *from;
+        if let Some(space) = bytes.get_mut(..size) {
+            space.copy_from_slice(data);
         }
         Ok(Value {
             len: size as u8,
@@ -109,8 +109,8 @@ impl Value {
     pub fn new(data_type: DataType, number: i64) -> Value {
         let size = data_type.size().unwrap_or(0);
         let mut bytes = number.to_le_bytes();
-        for byte in bytes.iter_mut().skip(size) {
-            *byte = 0;
+        if let Some(cut_off) = bytes.get_mut(size..) {
+            cut_off.fill(0);
         }
         Value {
             len: size as u8,
@@ -122,6 +122,11 @@ impl Value {
     /// The bytes, little-endian.
     pub fn bytes(&self) -> &[u8] {
         self.bytes.get(..usize::from(self.len)).unwrap_or(&[])
+    }
+
+    /// The bytes with zeros after them.
+    pub const fn padded(&self) -> [u8; VALUE_MAX] {
+        self.bytes
     }
 
     /// The number with its sign. Unsigned 64-bit numbers above [`i64::MAX`]

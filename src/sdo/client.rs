@@ -3,7 +3,7 @@
 use super::abort::AbortCode;
 use super::channel::{Channel, Payload, Protocol, Transfer};
 use super::progress::{Progress, StartError};
-use super::response::Response;
+use super::response::{RESPONSE_MAX, Response};
 use crate::frame::Frame;
 use crate::id::{Address, CobId, NodeId};
 use crate::time::{Duration, Instant};
@@ -22,7 +22,7 @@ impl Payload for Response {
     }
 
     fn begin(&mut self, size: Option<u32>) -> Result<(), AbortCode> {
-        if size.is_some_and(|size| size as usize > super::RESPONSE_MAX) {
+        if size.is_some_and(|size| size as usize > RESPONSE_MAX) {
             return Err(AbortCode::OUT_OF_MEMORY);
         }
         Ok(())
@@ -101,17 +101,19 @@ impl Client {
         data: Option<&[u8]>,
         now: Instant,
     ) -> Result<Frame, StartError> {
-        let mut buffer = Response::empty(at);
         if let Some(data) = data
-            && !buffer.append(data)
+            && data.len() > RESPONSE_MAX
         {
             return Err(StartError::Length(data.len()));
         }
+        self.channel.ready(now)?;
+        self.buffer = Response::empty(at);
+        if let Some(data) = data {
+            self.buffer.append(data);
+        }
         let size = data.map(|data| data.len() as u32);
-        let (protocol, payload) = (Protocol::Normal, &mut buffer);
-        let frame = self.channel.start(at, size, protocol, payload, now)?;
-        self.buffer = buffer;
-        Ok(frame)
+        self.channel
+            .start(at, size, Protocol::Normal, &mut self.buffer, now)
     }
 
     /// Ends the request under way, if there is one, with an abort to the

@@ -234,6 +234,18 @@ impl Channel {
         }
     }
 
+    /// # Errors
+    /// If no transfer could be started at `now`.
+    pub(super) fn ready(&self, now: Instant) -> Result<(), StartError> {
+        match self.state {
+            _ if self.is_ready(now) => Ok(()),
+            State::Quarantine => Err(StartError::Quarantine {
+                until: self.deadline,
+            }),
+            _ => Err(StartError::Busy),
+        }
+    }
+
     /// Writes `size` bytes. Returns the frame to send.
     ///
     /// # Errors
@@ -275,15 +287,7 @@ impl Channel {
         payload: &mut dyn Payload,
         now: Instant,
     ) -> Result<Frame, StartError> {
-        match self.state {
-            _ if self.is_ready(now) => {}
-            State::Quarantine => {
-                return Err(StartError::Quarantine {
-                    until: self.deadline,
-                });
-            }
-            _ => return Err(StartError::Busy),
-        }
+        self.ready(now)?;
         self.at = at;
         self.size = size;
         self.done = 0;
