@@ -35,8 +35,9 @@ const LOOK: Time = Time::from_ms(1);
 /// An axis that shall stop does not become faster than it was by more: noise and
 /// the tail of its loop, rpm.
 const FASTER_RPM: f64 = 40.0;
-/// Axes slower than that when the stop begins are not compared, rpm.
-const COMPARED_RPM: f64 = 100.0;
+/// Axes slower than that when the stop begins are not compared, rpm: their ramps
+/// are so flat that noise of 1 rpm is several milliseconds.
+const COMPARED_RPM: f64 = 200.0;
 /// Axes come to rest together if they reach this part of their speeds together.
 const TOGETHER_PART: f64 = 0.15;
 /// The firmware's limit of the following error: a part of a turn.
@@ -311,7 +312,10 @@ impl Strike {
         must(
             world,
             apart.is_none_or(|apart| apart <= cycle),
-            "the axes do not come to rest together",
+            &format!(
+                "the axes come to rest {} ms apart",
+                apart.unwrap_or(Time::ZERO).as_ms()
+            ),
         )?;
         Ok(Struck {
             at,
