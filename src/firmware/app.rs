@@ -118,6 +118,7 @@ mod app {
         axes_place: MaybeUninit<Axes> = MaybeUninit::uninit(),
         boot_place: MaybeUninit<NetworkBoot<AXES>> = MaybeUninit::uninit(),
         own_place: MaybeUninit<OwnNode> = MaybeUninit::uninit(),
+        line_places: [Line; BUSES] = [const { Line::new() }; BUSES],
         network_queue: FrameQueue = Queue::new(),
         answer_queue: FrameQueue = Queue::new(),
         transfer_queue: FrameQueue = Queue::new(),
@@ -164,7 +165,7 @@ mod app {
                     sync: lines::element(&Frame::empty(CobId::SYNC)).with_event(),
                     counter: SyncCounter::NONE,
                 },
-                lines: [const { Line::new() }; BUSES],
+                lines: cx.local.line_places,
                 control: Control::new(),
                 states: [can::ErrorState::Active; BUSES],
                 receiver: Receiver {

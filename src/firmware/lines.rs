@@ -75,9 +75,9 @@ pub struct Line {
     left: u8,
 }
 
-/// All buses.
+/// All buses, where they stay.
 #[expect(unreachable_pub, reason = "RTIC wants shared resources to be public")]
-pub type Lines = [Line; BUSES];
+pub type Lines = &'static mut [Line; BUSES];
 
 impl Line {
     pub(crate) const fn new() -> Line {
