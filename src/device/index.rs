@@ -52,6 +52,8 @@ pub(super) const CLOCK: u16 = 0x2F10;
 pub(super) const TIME_PERIOD: u16 = 0x2F11;
 /// Manufacturer: a transfer of test data.
 pub(super) const TRANSFER_TEST: u16 = 0x2F12;
+/// Manufacturer: what the board measures of itself.
+pub(super) const MEASURED: u16 = 0x2F20;
 /// Manufacturer: emergencies of node n at 2F80h + n.
 pub(super) const EMCY_HISTORY: u16 = 0x2F80;
 pub(super) const EMCY_HISTORY_LAST: u16 = 0x2FFF;

@@ -111,6 +111,14 @@ pub trait Board {
     /// What the client is told: 08000022h if it would not.
     fn may_request(&mut self, control: NodeControl) -> Result<(), AbortCode>;
 
+    /// The entry `sub` of 2F20h: what the board measures of itself.
+    fn measured(&mut self, _sub: u8) -> u32 {
+        0
+    }
+
+    /// 2F20h was written to: what it holds begins anew.
+    fn measure_anew(&mut self) {}
+
     /// The bytes of a TPDO of a node as it last came, zeros before.
     fn tpdo(&mut self, node: NodeId, number: u8) -> [u8; MAX_DATA];
 

@@ -52,6 +52,7 @@ pub(super) enum Item {
     EmcyWords,
     Clock,
     TransferTest,
+    Measured,
     EmcyCount,
     EmcyHistory,
     Process,
@@ -123,7 +124,7 @@ const MAPPED: u8 = 64;
 /// Objects of one kind of PDO parameters.
 const PDOS: u16 = 0x1FF;
 
-pub(super) static TABLE: [Row; 54] = {
+pub(super) static TABLE: [Row; 56] = {
     use Access::{Constant, ReadOnly, ReadWrite, WriteOnly};
     use DataType::{
         Domain, TimeOfDay, Unsigned8, Unsigned16, Unsigned32, Unsigned64, VisibleString,
@@ -326,6 +327,20 @@ pub(super) static TABLE: [Row; 54] = {
         transfer_test((1, 3), ReadWrite),
         transfer_test((4, 4), WriteOnly),
         transfer_test((5, 7), ReadOnly),
+        Row::array(
+            index::MEASURED,
+            (1, 1),
+            Unsigned32,
+            ReadWrite,
+            Item::Measured,
+        ),
+        Row::array(
+            index::MEASURED,
+            (2, 13),
+            Unsigned32,
+            ReadOnly,
+            Item::Measured,
+        ),
         Row::variable(index::EMCY_HISTORY, Unsigned8, ReadWrite, Item::EmcyCount)
             .up_to(index::EMCY_HISTORY_LAST),
         Row::array(

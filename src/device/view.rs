@@ -119,6 +119,7 @@ impl<B: Board, const N: usize> View<'_, B, N> {
                 return Ok(u64::from_le_bytes([a, b, c, d, e, f, 0, 0]));
             }
             Item::TransferTest => dictionary.transfer.word(found.n()),
+            Item::Measured => self.board.measured(found.sub),
             Item::Process => {
                 let process = dictionary.process(found).ok_or(AbortCode::NO_DATA)?;
                 let (node, pdo) = (process.node, process.number);
@@ -203,6 +204,8 @@ impl<B: Board, const N: usize> ObjectDictionary for View<'_, B, N> {
                 dictionary.may_request(self.board, NodeControl { command, target })?;
                 return dictionary.push(Event::Configure(target));
             }
+            // Whatever is written.
+            Item::Measured => self.board.measure_anew(),
             Item::TransferTest => return dictionary.set_transfer_word(found.n(), number),
             Item::Clock => {
                 let time = TimeOfDay::decode([a, b, c, d, e, f]);

@@ -30,6 +30,7 @@ mod app {
         filters, leds,
         lines::{self, Line, Lines, PRODUCING, SYNCS, Sender},
         log::{News, UPTIME_MS},
+        measured::{self, Figure},
         own_node::{Order, OwnNode, Storage},
         reception::{Receiver, States, queue},
         report::{publish, tell},
@@ -69,6 +70,8 @@ mod app {
         states: States,
         #[lock_free]
         receiver: Receiver,
+        phase: timers::Phase,
+        clock_us: timers::Microseconds,
         commands: [AxisCommand; AXES],
     }
 
@@ -95,6 +98,7 @@ mod app {
         orders: Consumer<'static, Order>,
         counts: Counts,
         asking: Asking,
+        asleep: u32,
         known_bus: can::ErrorState,
         reset_cause: ResetCause,
         clock: timers::Microseconds,
@@ -177,6 +181,8 @@ mod app {
                     transfer_to,
                     requests_to,
                 },
+                phase: board.phase,
+                clock_us: board.microseconds,
                 commands: [AxisCommand::default(); AXES],
             },
             Local {
@@ -201,6 +207,7 @@ mod app {
                 orders,
                 counts: Counts::default(),
                 asking: Asking::default(),
+                asleep: 0,
                 known_bus: can::ErrorState::Active,
                 reset_cause: board.reset_cause,
                 clock: board.microseconds,
@@ -245,10 +252,15 @@ mod app {
     }
 
     /// Sleeps until the next interrupt.
-    #[idle]
-    fn idle(_: idle::Context) -> ! {
+    #[idle(shared = [&clock_us])]
+    fn idle(cx: idle::Context) -> ! {
         loop {
-            cortex_m::asm::wfi();
+            // What wakes it runs when the time is taken.
+            cortex_m::interrupt::free(|_| {
+                let since = cx.shared.clock_us.now();
+                cortex_m::asm::wfi();
+                measured::slept(cx.shared.clock_us.now().wrapping_sub(since));
+            });
         }
     }
 
@@ -258,7 +270,7 @@ mod app {
     /// timer's event to the transmit request, 260 to the last of three. If it is
     /// late, the SYNC is, by as much: jitter. If the last SYNC still waits for the
     /// bus, none is sent and that is counted.
-    #[task(binds = TIM2, priority = 5, local = [period], shared = [sender])]
+    #[task(binds = TIM2, priority = 5, local = [period], shared = [sender, &phase])]
     fn sync_tick(mut cx: sync_tick::Context) {
         if PRODUCING.load(Ordering::Relaxed) {
             cx.shared.sender.lock(Sender::sync);
@@ -269,6 +281,7 @@ mod app {
         // What may go after the SYNC.
         lines::send_now();
         roll::check_in(Task::SyncTick);
+        measured::give(Figure::SyncTick, cx.shared.phase.ticks());
     }
 
     /// Refills the transmit buffers and empties the receive FIFOs.
@@ -333,9 +346,10 @@ mod app {
         binds = TIM3,
         priority = 3,
         local = [deadline, axes, events_to],
-        shared = [od, lines, control, commands]
+        shared = [od, lines, control, commands, &phase]
     )]
     fn pdo_producer(mut cx: pdo_producer::Context) {
+        let begun = cx.shared.phase.ticks();
         if derived::WINDOW_US != 0 && cx.local.deadline.take_second() {
             lines::send_now();
         }
@@ -367,6 +381,7 @@ mod app {
         } else if control.leads() && !control.bus_off {
             axes.write(&cycle, &mut cx.shared.lines);
             lines::send_now();
+            measured::give(Figure::Cycle, cx.shared.phase.elapsed_us());
         }
         while let Some(event) = axes.take_event() {
             if cx.local.events_to.enqueue(event).is_err() {
@@ -374,6 +389,7 @@ mod app {
             }
             wake::want();
         }
+        measured::give(Figure::PdoProducer, cx.shared.phase.ticks_since(begun));
     }
 
     /// The worst of the controllers' states.
@@ -393,12 +409,13 @@ mod app {
         local = [
             tick, microseconds, milliseconds, run_led, error_led, button, debounce, watchdog,
             from_can, states_to, news_to, supervisor, heartbeat, heartbeat_time,
-            orders, counts, known_bus, asking,
+            orders, counts, known_bus, asking, asleep,
         ],
-        shared = [od, lines, control, states]
+        shared = [od, lines, control, states, &phase]
     )]
     fn network(mut cx: network::Context) {
         let local = cx.local;
+        let begun = cx.shared.phase.ticks();
         local.tick.acknowledge();
         let counter = local.microseconds.now();
         CLOCK.keep(counter);
@@ -471,6 +488,8 @@ mod app {
                 .shared
                 .lines
                 .lock(|lines| lines.iter().map(|line| line.planned.overflows()).sum());
+            measured::second(local.asleep, overruns);
+            publish(local.news_to, News::Measured);
             let counts = Counts::now(overruns, wrong_length, overflows);
             if counts != *local.counts {
                 *local.counts = counts;
@@ -482,6 +501,7 @@ mod app {
         if roll::complete() {
             local.watchdog.feed();
         }
+        measured::give(Figure::Network, cx.shared.phase.ticks_since(begun));
     }
 
     /// Boots, checks and configures the nodes, all at once, starts them, and

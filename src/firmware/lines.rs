@@ -7,6 +7,7 @@
 //! cycle nothing is begun that could still be on the wire when the next SYNC is
 //! due. While no SYNC is produced all may go at any time.
 
+use crate::measured;
 use crate::{
     counters,
     derived::{
@@ -260,6 +261,7 @@ pub(crate) fn refill(
         {
             counters::RPDO_REPLACED.add(1);
         }
+        measured::add_bits(bus, frame.dlc().into());
         for place in &mut pending {
             if *place == can::FREE {
                 *place = frame.id().get();

@@ -2,7 +2,7 @@
 //! writes it: the others hand over what they have to say, so that no log line
 //! delays them and no two collide.
 
-use crate::counters::Counts;
+use crate::{counters::Counts, measured};
 use canmaster::{
     NodeId,
     boot::Event,
@@ -37,6 +37,7 @@ enum Line<'a> {
     NotStored,
     Controller(ErrorState),
     Counts(&'a Counts),
+    Measured(u32, u32, u32, u32, u32, u32),
     Boot(&'a Event),
     Notice(&'a Notice),
     /// Of a node that the network does not name.
@@ -68,6 +69,15 @@ in_log!(Line<'_> {
         counts.rx_queue_full,
         counts.tpdo_length,
         counts.log_full
+    ),
+    Line::Measured(jitter, cycle, step, bus, cpu, overruns) => (
+        "SYNC jitter {} us, cycle {} us, pdo_producer {} cycles, bus {} per mille, CPU {} per mille, {} overruns",
+        jitter,
+        cycle,
+        step,
+        bus,
+        cpu,
+        overruns
     ),
     Line::Boot(event) => ("{}", *event),
     Line::Notice(notice) => ("{}", *notice),
@@ -140,6 +150,8 @@ pub(crate) enum News {
     Node(Report),
     ErrorState(ErrorState),
     Counts(Counts),
+    /// A second is over.
+    Measured,
 }
 
 impl News {
@@ -215,6 +227,12 @@ impl Log {
         let (level, line) = match news {
             News::Node(report) => return self.report(report),
             News::Counts(counts) => (Level::Warning, Line::Counts(counts)),
+            News::Measured => {
+                let [jitter, cycle, step, bus, cpu, overruns] =
+                    [1, 3, 6, 8, 9, 10].map(measured::entry);
+                let line = Line::Measured(jitter, cycle, step, bus, cpu, overruns);
+                (Level::Debug, line)
+            }
             News::ErrorState(state) => {
                 let level = match state {
                     ErrorState::BusOff => self.fault(),

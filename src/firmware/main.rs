@@ -29,6 +29,8 @@ mod lines;
 #[cfg(target_os = "none")]
 mod log;
 #[cfg(target_os = "none")]
+mod measured;
+#[cfg(target_os = "none")]
 mod own_node;
 #[cfg(target_os = "none")]
 mod reception;

@@ -13,6 +13,7 @@ use crate::{
     control::Control,
     derived::{AXES, PDOS, SYNC_LIMITS},
     log::News,
+    measured,
 };
 use canmaster::{
     Frame, NodeId,
@@ -101,6 +102,14 @@ where
         // Why not, the boot status says (2F00h, 2F01h).
         let allowed = self.boot.may_request(control);
         allowed.map_err(|_| AbortCode::DEVICE_STATE)
+    }
+
+    fn measured(&mut self, sub: u8) -> u32 {
+        measured::entry(sub)
+    }
+
+    fn measure_anew(&mut self) {
+        measured::anew();
     }
 
     fn tpdo(&mut self, node: NodeId, number: u8) -> [u8; 8] {
@@ -290,6 +299,7 @@ impl OwnNode {
                 Notice::BootUp(_) | Notice::NotOperational { .. } => {}
             },
             News::ErrorState(state) => self.error_state(*state),
+            News::Measured => {}
             News::Counts(counts) => {
                 let lost = counts.rx_overruns.wrapping_add(counts.rx_queue_full);
                 if lost != self.lost_frames {

@@ -5,6 +5,7 @@ use crate::{
     derived::{AXES, BUSES, CONTROLLERS},
     filters::{self, Handler},
     lines::{self, Line, Lines, PRODUCING, SYNCS, Sender},
+    measured::{self, Figure},
     transfer, wake,
 };
 use canmaster::{
@@ -46,6 +47,7 @@ impl Receiver {
         let Some(&controller) = CONTROLLERS.get(bus) else {
             return;
         };
+        let begun = self.phase.ticks();
         let flags = self.rx.take_flags(controller);
         if flags.rare() {
             if flags.message_lost() {
@@ -55,16 +57,24 @@ impl Receiver {
         }
         // First of all, so that the bus is not idle for longer than it must.
         lines::refill(bus, lines, sender, self.phase);
+        if flags.sent_at() {
+            while let Some(at) = self.rx.take_sent_at(controller) {
+                measured::sync_began(bus, at);
+            }
+        }
         if flags.received(can::Fifo::Fifo0) {
             while let Some(element) = self.rx.receive(controller, can::Fifo::Fifo0) {
+                measured::add_bits(bus, element.len() as u32);
                 self.tpdo(&element, od);
             }
         }
         if flags.received(can::Fifo::Fifo1) {
             while let Some(element) = self.rx.receive(controller, can::Fifo::Fifo1) {
+                measured::add_bits(bus, element.len() as u32);
                 self.other(&element, bus);
             }
         }
+        measured::give(Figure::CanIrq, self.phase.ticks_since(begun));
     }
 
     #[inline(never)]

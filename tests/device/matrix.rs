@@ -103,6 +103,8 @@ const OBJECTS: &[(u16, u8, usize, Access)] = {
         (0x2F12, 4, 4, Write),
         (0x2F12, 5, 4, Read),
         (0x2F12, 7, 4, Read),
+        (0x2F20, 1, 4, ReadWrite),
+        (0x2F20, 13, 4, Read),
         (0x2F81, 0, 1, ReadWrite),
         (0x3001, 0, 1, Read),
         (0x3001, 1, 2, Read),
@@ -187,6 +189,7 @@ const WRITABLE: &[(std::ops::RangeInclusive<u16>, std::ops::RangeInclusive<u8>)]
     (0x1F89..=0x1F89, 0..=0),
     (0x2F10..=0x2F11, 0..=0),
     (0x2F12..=0x2F12, 1..=4),
+    (0x2F20..=0x2F20, 1..=1),
     (0x2F81..=0x2F86, 0..=0),
 ];
 

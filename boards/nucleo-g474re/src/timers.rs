@@ -68,6 +68,27 @@ impl Phase {
         unsafe { (*pac::TIM3::ptr()).cnt().read().bits() }
     }
 
+    /// Cycles of the core since the period began, by TIM2.
+    #[inline(always)]
+    pub fn ticks(self) -> u32 {
+        // SAFETY: as above, of TIM2.
+        unsafe { (*pac::TIM2::ptr()).cnt().read().bits() }
+    }
+
+    /// Cycles of the core since [`ticks`](Phase::ticks) were `begun`, less than a
+    /// period ago.
+    #[inline(always)]
+    pub fn ticks_since(self, begun: u32) -> u32 {
+        let now = self.ticks();
+        let passed = now.wrapping_sub(begun);
+        if now >= begun {
+            return passed;
+        }
+        // SAFETY: as above.
+        let last = unsafe { (*pac::TIM2::ptr()).arr().read().bits() };
+        passed.wrapping_add(last).wrapping_add(1)
+    }
+
     /// Microseconds until it ends.
     #[inline(always)]
     pub fn left_us(self) -> u32 {
