@@ -103,7 +103,7 @@ impl Axes {
     /// Writes the RPDOs of the next cycle.
     pub(crate) fn write(&mut self, cycle: &Cycle, lines: &mut impl Mutex<T = Lines>) {
         lines.lock(|lines| {
-            for line in lines {
+            for line in lines.iter_mut() {
                 line.begin(cycle.sync);
             }
         });
