@@ -46,11 +46,20 @@ impl Sender {
     #[inline(always)]
     pub(crate) fn sync(&mut self) {
         self.sync.set_byte(self.counter.count());
-        for controller in CONTROLLERS {
-            let waits = holds(&can::pending(controller), CobId::SYNC);
-            if waits || self.tx.transmit(controller, &self.sync).is_err() {
-                counters::SYNC_NOT_SENT.add(1);
-            }
+        // Not in a loop, so that the addresses are constant.
+        self.sync_on(CONTROLLERS.first());
+        self.sync_on(CONTROLLERS.get(1));
+        self.sync_on(CONTROLLERS.get(2));
+    }
+
+    #[inline(always)]
+    fn sync_on(&mut self, controller: Option<&can::Controller>) {
+        let Some(&controller) = controller else {
+            return;
+        };
+        let waits = holds(&can::pending(controller), CobId::SYNC);
+        if waits || self.tx.transmit(controller, &self.sync).is_err() {
+            counters::SYNC_NOT_SENT.add(1);
         }
     }
 }
@@ -63,9 +72,9 @@ pub struct Line {
     /// RPDOs of every cycle that go after the TPDOs of their own cycle.
     burst: Burst<{ TPDOS_PER_AXIS * AXES }>,
     /// RPDOs of every cycle that wait for the next SYNC.
-    early: Burst<EARLY_FRAMES>,
-    /// Those that are being made meanwhile.
-    coming: Burst<EARLY_FRAMES>,
+    early: [Burst<EARLY_FRAMES>; 2],
+    /// Which of the two is being sent; the other is made meanwhile.
+    second: bool,
     /// The SYNC after whose TPDOs they were made.
     made_after: u32,
     /// Everything else.
@@ -84,8 +93,8 @@ impl Line {
     pub(crate) const fn new() -> Line {
         Line {
             burst: Burst::new(),
-            early: Burst::new(),
-            coming: Burst::new(),
+            early: [const { Burst::new() }; 2],
+            second: false,
             made_after: 0,
             planned: TxQueue::new(),
             cycle: 0,
@@ -97,7 +106,7 @@ impl Line {
     pub(crate) fn begin(&mut self, sync: u32) {
         self.drop_late();
         if EARLY {
-            self.coming.begin();
+            self.early(false).begin();
         }
         self.made_after = sync;
     }
@@ -109,7 +118,7 @@ impl Line {
     /// An RPDO of every cycle, to be sent in its own or after the next SYNC.
     pub(crate) fn cyclic(&mut self, frame: Frame, early: bool) {
         if EARLY && early {
-            self.coming.put(frame);
+            self.early(false).put(frame);
         } else {
             self.burst.put(frame);
         }
@@ -125,8 +134,9 @@ impl Line {
     /// Drops all, after bus-off.
     pub(crate) fn clear(&mut self) {
         self.burst.begin();
-        self.early.begin();
-        self.coming.begin();
+        for burst in &mut self.early {
+            burst.begin();
+        }
         self.planned.clear();
     }
 
@@ -142,13 +152,13 @@ impl Line {
         }
         let syncs = SYNCS.load(Relaxed);
         if EARLY {
-            if self.made_after != syncs && !self.coming.is_over() {
-                counters::RPDO_REPLACED.add(self.early.begin() as u32);
-                core::mem::swap(&mut self.early, &mut self.coming);
+            if self.made_after != syncs && !self.early(false).is_over() {
+                counters::RPDO_REPLACED.add(self.early(true).begin() as u32);
+                self.second = !self.second;
             }
             // Before the planned frames, which would take a buffer from them for long.
-            if !self.early.is_over() {
-                return self.early.next(pending);
+            if !self.early(true).is_over() {
+                return self.early(true).next(pending);
             }
         }
         if waits && let Some(frame) = self.next_planned(bus, pending, syncs, phase) {
@@ -164,17 +174,29 @@ impl Line {
 
     #[inline(always)]
     fn is_empty(&self) -> bool {
-        self.planned.is_empty() && self.rpdos_are_sent() && (!EARLY || self.coming.is_over())
+        let [first, second] = &self.early;
+        let early = EARLY && !(first.is_over() && second.is_over());
+        self.planned.is_empty() && self.burst.is_over() && !early
+    }
+
+    /// The burst that is being sent, or the one that is made meanwhile.
+    #[inline(always)]
+    fn early(&mut self, being_sent: bool) -> &mut Burst<EARLY_FRAMES> {
+        let [first, second] = &mut self.early;
+        match self.second == being_sent {
+            true => second,
+            false => first,
+        }
     }
 
     #[inline(always)]
-    fn rpdos_are_sent(&self) -> bool {
-        self.burst.is_over() && (!EARLY || self.early.is_over())
+    fn rpdos_are_sent(&mut self) -> bool {
+        self.burst.is_over() && (!EARLY || self.early(true).is_over())
     }
 
     fn next_rpdo(&mut self, pending: &Pending) -> Option<Frame> {
         let early = if EARLY {
-            self.coming.next(pending)
+            self.early(false).next(pending)
         } else {
             None
         };
