@@ -104,15 +104,15 @@ fn histogram(late: &[f64]) -> Vec<usize> {
     counts
 }
 
-/// A late SYNC has an excuse: a frame that was on the wire when it was due, and
-/// that it followed at once.
+/// A late SYNC has an excuse: a frame that was on the wire when it was due (or came
+/// before it within what counts as on time), and that it followed at once.
 fn unexplained(records: &[WireRecord], late: &[(usize, f64)]) -> usize {
     let ps = |us: f64| Time((us * PS_PER_US as f64) as u64);
     let excused = |place: usize, us: f64| {
         let sync = &records[place];
         let before = place.checked_sub(1).and_then(|place| records.get(place));
         before.is_some_and(|frame| {
-            let due = sync.sof - ps(us);
+            let due = sync.sof - ps(us) + ps(ON_TIME_US);
             frame.sof <= due && sync.sof <= frame.end + ps(ON_TIME_US)
         })
     };

@@ -21,6 +21,13 @@ pub fn arrival_tolerance(cycle: Time) -> i64 {
     ARRIVAL_TOLERANCE * us as i64 / LONGEST_US as i64
 }
 
+/// How far apart axes that belong together may stop: one cycle, and no less than
+/// what the drives' own loops, 3 .. 10 ms slow, spread at any cycle.
+pub fn stop_tolerance(cycle: Time) -> Time {
+    const LEAST: Time = Time::from_ms(10);
+    cycle.max(LEAST)
+}
+
 /// How long interrupts may be off at a time, cycles: SYNC must not wait.
 pub const IRQ_OFF_LIMIT: u64 = 120;
 
@@ -188,13 +195,15 @@ fn moves_missing(evidence: &Evidence<'_>) -> Option<String> {
 
 fn out_of_step(evidence: &Evidence<'_>) -> Option<String> {
     let (apart, a, b) = worst_pair(evidence.arrivals)?;
-    (apart > evidence.assignment.cycle).then(|| {
+    let allowed = stop_tolerance(evidence.assignment.cycle);
+    (apart > allowed).then(|| {
         format!(
-            "nodes {} and {} belong together and stopped {:.1} ms apart (allowed: one cycle); \
+            "nodes {} and {} belong together and stopped {:.1} ms apart (allowed: {} ms); \
              standstill is below {STANDSTILL_RPM} rpm",
             a.get(),
             b.get(),
-            apart.as_us_f64() / 1000.0
+            apart.as_us_f64() / 1000.0,
+            allowed.as_ms()
         )
     })
 }
@@ -345,6 +354,14 @@ mod tests {
     fn a_longer_cycle_has_a_larger_tolerance() {
         for (ms, allowed) in [(1, 5), (10, 5), (20, 10), (60, 30)] {
             assert_eq!(arrival_tolerance(Time::from_ms(ms)), allowed);
+        }
+    }
+
+    #[test]
+    fn axes_stop_together_within_a_cycle_or_ten_milliseconds() {
+        for (us, allowed_ms) in [(1_000, 10), (2_000, 10), (10_000, 10), (50_000, 50)] {
+            let allowed = stop_tolerance(Time::from_us(us));
+            assert_eq!(allowed, Time::from_ms(allowed_ms));
         }
     }
 
