@@ -111,7 +111,7 @@ pub(crate) const CASES: [Case; 4] = [
 /// What the search for the smallest cycle asks: load and SDO are no matter.
 pub(crate) const SEARCHED: Case = Case {
     name: "search",
-    tuned: |config| answering(config, ANSWER_2MS),
+    tuned: |config| answering(config, ANSWER_1MS),
     disturbed: false,
     limits: Limits {
         cpu_load: None,
