@@ -4,7 +4,9 @@
 use std::hint::black_box;
 
 use canmaster::motion::experiment::GROUP;
-use canmaster::motion::{AxisCommand, AxisFeedback, FaultCause, Group, GroupState, Request};
+use canmaster::motion::{
+    AxisCommand, AxisFeedback, AxisMove, Director, FaultCause, Group, GroupState, Inputs, Order,
+};
 
 const AXES: usize = 6;
 /// Increments that an axis goes in a cycle of 10 ms at 3 rpm: 2000 a turn.
@@ -48,7 +50,7 @@ fn obey(drive: &mut AxisFeedback, command: &AxisCommand, awake: bool) {
         _ => DISABLED,
     };
     let moves = drive.statusword == ENABLED;
-    drive.velocity = if moves { command.velocity } else { 0 };
+    drive.velocity = if moves { command.target } else { 0 };
     drive.position += drive.velocity * STEP_INC / STEP_RPM;
 }
 

@@ -5,6 +5,7 @@ use std::hint::black_box;
 use canmaster::NodeId;
 use canmaster::master::{AxisPdos, MasterOd, TPDOS_PER_AXIS, TpdoSlot};
 use canmaster::motion::AxisCommand;
+use canmaster::motion::mode::Mode;
 use canmaster::network::sample::SIX_EPOS4;
 
 const AXES: usize = 6;
@@ -63,8 +64,9 @@ pub(crate) fn feedback(times: u32) {
 pub(crate) fn rpdo(times: u32) {
     let [pdos, ..] = &PDOS;
     let command = AxisCommand {
+        mode: Mode::ProfileVelocity,
         controlword: 0x000F,
-        velocity: -1200,
+        target: -1200,
         acceleration: 1500,
         deceleration: 1500,
     };

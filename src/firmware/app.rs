@@ -43,7 +43,7 @@ mod app {
         design,
         id::{CobId, FunctionCode},
         master::{AxisMap, Debounce, ExtendedClock, MasterOd, Supervisor},
-        motion::{AxisCommand, Group, GroupEvent},
+        motion::{AxisCommand, Director, Group, GroupEvent},
         network::Network,
         nmt,
         sync::SyncCounter,
@@ -73,13 +73,14 @@ mod app {
         phase: timers::Phase,
         clock_us: timers::Microseconds,
         commands: [AxisCommand; AXES],
+        axes: &'static mut Axes,
     }
 
     #[local]
     struct Local {
         period: timers::Period,
         deadline: timers::Deadline,
-        axes: &'static mut Axes,
+        director: &'static mut Director<AXES>,
         events_to: Producer<'static, GroupEvent>,
         tick: timers::Tick,
         microseconds: timers::Microseconds,
@@ -119,6 +120,7 @@ mod app {
     /// before anything can be late.
     #[init(local = [
         group_place: MaybeUninit<Group<AXES>> = MaybeUninit::uninit(),
+        director_place: MaybeUninit<Director<AXES>> = MaybeUninit::uninit(),
         axes_place: MaybeUninit<Axes> = MaybeUninit::uninit(),
         boot_place: MaybeUninit<NetworkBoot<AXES>> = MaybeUninit::uninit(),
         own_place: MaybeUninit<OwnNode> = MaybeUninit::uninit(),
@@ -184,11 +186,12 @@ mod app {
                 phase: board.phase,
                 clock_us: board.microseconds,
                 commands: [AxisCommand::default(); AXES],
+                axes: new_axes(cx.local.group_place, cx.local.axes_place),
             },
             Local {
                 period: board.period,
                 deadline: board.deadline,
-                axes: new_axes(cx.local.group_place, cx.local.axes_place),
+                director: new_director(cx.local.director_place),
                 events_to,
                 tick: board.tick,
                 microseconds: board.microseconds,
@@ -235,6 +238,13 @@ mod app {
     ) -> &'static mut Axes {
         let group = Group::new_in(group, &derived::GROUP);
         axes.write(Axes::new(NETWORK, group))
+    }
+
+    #[inline(never)]
+    fn new_director(
+        place: &'static mut MaybeUninit<Director<AXES>>,
+    ) -> &'static mut Director<AXES> {
+        place.write(Director::new(&derived::GROUP))
     }
 
     #[inline(never)]
@@ -345,8 +355,8 @@ mod app {
     #[task(
         binds = TIM3,
         priority = 3,
-        local = [deadline, axes, events_to],
-        shared = [od, lines, control, commands, &phase]
+        local = [deadline, events_to],
+        shared = [od, lines, control, commands, axes, &phase]
     )]
     fn pdo_producer(mut cx: pdo_producer::Context) {
         let begun = cx.shared.phase.ticks();
@@ -367,29 +377,35 @@ mod app {
             return;
         };
         let control = cx.shared.control.lock(Control::take);
-        let axes = cx.local.axes;
-        axes.read(&cycle, &mut cx.shared.od);
-        axes.step(&control);
-        let enabled = axes.enabled(&control);
-        (&mut cx.shared.control, &mut cx.shared.commands).lock(|control, commands| {
-            control.axes_enabled = enabled;
-            *commands = *axes.commands();
-        });
-        if cx.local.deadline.elapsed_us() > control.latest_us {
-            // What comes after the window of the SYNC is not sent any more.
-            counters::RPDO_REPLACED.add(1);
-        } else if control.leads() && !control.bus_off {
-            axes.write(&cycle, &mut cx.shared.lines);
-            lines::send_now();
-            measured::give(Figure::Cycle, cx.shared.phase.elapsed_us());
-        }
-        while let Some(event) = axes.take_event() {
-            if cx.local.events_to.enqueue(event).is_err() {
-                counters::LOG_FULL.add(1);
+        let events_to = cx.local.events_to;
+        let phase = cx.shared.phase;
+        cx.shared.axes.lock(|axes| {
+            axes.read(&cycle, &mut cx.shared.od);
+            axes.step(&control);
+            let enabled = axes.enabled(&control);
+            (&mut cx.shared.control, &mut cx.shared.commands).lock(|control, commands| {
+                control.axes_enabled = enabled;
+                *commands = *axes.commands();
+            });
+            if cx.local.deadline.elapsed_us() > control.latest_us {
+                // What comes after the window of the SYNC is not sent any more.
+                counters::RPDO_REPLACED.add(1);
+            } else if control.leads() && !control.bus_off {
+                axes.write(&cycle, &mut cx.shared.lines);
+                lines::send_now();
+                measured::give(Figure::Cycle, phase.elapsed_us());
             }
-            wake::want();
-        }
-        measured::give(Figure::PdoProducer, cx.shared.phase.ticks_since(begun));
+            while let Some(event) = axes.take_event() {
+                if events_to.enqueue(event).is_err() {
+                    counters::LOG_FULL.add(1);
+                }
+                wake::want();
+            }
+            if axes.moves() || axes.pressed {
+                wake::want();
+            }
+        });
+        measured::give(Figure::PdoProducer, phase.ticks_since(begun));
     }
 
     /// The worst of the controllers' states.
@@ -514,10 +530,10 @@ mod app {
     #[task(
         priority = 1,
         local = [
-            reset_cause, clock, boot, answers, transfer_answers, states, news, events, own, requests, orders_to,
+            reset_cause, clock, boot, director, answers, transfer_answers, states, news, events, own, requests, orders_to,
             sync_period, store,
         ],
-        shared = [od, sender, lines, control, commands]
+        shared = [od, sender, lines, control, commands, axes]
     )]
     async fn sdo_configurator(cx: sdo_configurator::Context) {
         let mut wake = wake::reader();

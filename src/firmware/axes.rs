@@ -8,7 +8,9 @@ use crate::{
 use canmaster::{
     cia402::StatusWord,
     master::{Cycle, MasterOd, Ramps, TPDOS_PER_AXIS, TpdoSlot},
-    motion::{AxisCommand, AxisFeedback, Group, GroupEvent, GroupState, Request, Speedometer},
+    motion::{
+        AxisCommand, AxisFeedback, Group, GroupEvent, GroupState, Inputs, Order, Speedometer,
+    },
     network::Network,
 };
 use rtic::Mutex;
@@ -25,9 +27,13 @@ const SPEEDOMETERS: [Speedometer; AXES] = {
 };
 
 /// The group with what surrounds it.
-pub(crate) struct Axes {
+#[expect(unreachable_pub, reason = "RTIC wants shared resources to be public")]
+pub struct Axes {
     network: &'static Network,
-    group: &'static mut Group<AXES>,
+    pub(crate) group: &'static mut Group<AXES>,
+    /// The button was pressed while nothing moved: `sdo_configurator` runs the
+    /// program.
+    pub(crate) pressed: bool,
     feedback: [AxisFeedback; AXES],
     commands: [AxisCommand; AXES],
     ramps: Ramps<AXES>,
@@ -39,6 +45,7 @@ impl Axes {
         Axes {
             network,
             group,
+            pressed: false,
             feedback: [AxisFeedback::default(); AXES],
             commands: [AxisCommand::default(); AXES],
             ramps: Ramps::new(),
@@ -62,21 +69,32 @@ impl Axes {
         }
     }
 
-    /// Steps the group. A press of the button releases the motion, and stops it
-    /// when there is one.
+    /// Steps the group. A press of the button stops the motion, and else asks for
+    /// one.
     pub(crate) fn step(&mut self, control: &Control) {
-        let moving = self.group.state() == GroupState::Moving;
-        let request = Request {
+        let moving = self.moves();
+        if control.pressed && moving {
+            // Refused in no state in which the group moves.
+            let _ = self.group.order(Order::Stop);
+        }
+        self.pressed |= control.pressed && !moving;
+        let inputs = Inputs {
             network_ready: control.network_ready
                 && control.leads()
                 && !control.bus_off
                 && !control.cycle_differs,
-            release: control.pressed && !moving,
-            stop: control.pressed && moving,
             fault: control.fault,
             absent: !control.operational,
         };
-        self.group.step(request, &self.feedback, &mut self.commands);
+        self.group.step(&inputs, &self.feedback, &mut self.commands);
+    }
+
+    /// Whether what is planned counts.
+    pub(crate) fn moves(&self) -> bool {
+        matches!(
+            self.group.state(),
+            GroupState::Moving | GroupState::Homing | GroupState::ModeChange
+        )
     }
 
     /// What the axes are told.

@@ -3,6 +3,7 @@
 
 use crate::{
     app::app::{CLOCK, NETWORK, sdo_configurator as task},
+    derived::PROGRAM,
     duties::Silent,
     log::{self, Log},
     roll::{self, Task},
@@ -12,6 +13,7 @@ use crate::{
 use canmaster::{
     design,
     device::{Event, MasterError, Setting},
+    motion::GroupEvent,
     nmt::State,
     time::Instant,
 };
@@ -76,6 +78,7 @@ impl<'a> Configurator<'a> {
                 self.obey(&event);
             }
         }
+        self.direct();
         let bus_off = self.listen();
         // A board that is stopped has neither SDO nor SYNC: the boot-up waits.
         let held = self.local.own.device.state() == State::Stopped && !bus_off;
@@ -87,6 +90,27 @@ impl<'a> Configurator<'a> {
             next = deadline.map_or(next, |deadline| deadline.min(next));
         }
         wake::at(next.as_micros() as u32);
+    }
+
+    /// Plans motion: with the group only as long as it takes to look at it, and to
+    /// hand over what is planned.
+    fn direct(&mut self) {
+        let director = &mut *self.local.director;
+        let (refused, plan) = self.shared.axes.lock(|axes| {
+            let refused = match core::mem::take(&mut axes.pressed) {
+                true => director.run(axes.group).err(),
+                false => None,
+            };
+            (refused, director.look(axes.group, &PROGRAM))
+        });
+        if plan {
+            director.think();
+            self.shared.axes.lock(|axes| director.act(axes.group));
+        }
+        let refused = refused.map(GroupEvent::ReleaseRefused);
+        for event in [refused, director.take_event()].into_iter().flatten() {
+            self.log.group(&event);
+        }
     }
 
     /// What the other tasks have to say. `true`: the controller is bus-off.

@@ -4,7 +4,7 @@
 use canmaster::{
     design,
     master::{AxisPdos, TPDOS_PER_AXIS},
-    motion::{GroupConfig, Step, experiment},
+    motion::{GroupConfig, Program, experiment},
     sync::SyncLimits,
 };
 use nucleo_g474re::can::{BitTiming, Controller};
@@ -128,12 +128,18 @@ pub(crate) const SYNC_LIMITS: SyncLimits = SyncLimits {
 /// Frames that may wait for a transmit buffer.
 pub(crate) const TX_QUEUE: usize = design::tx_queue(AXES);
 
-static STEPS: [Step<AXES>; 3] = experiment::steps(&generated::MOTORS, NETWORK.cycle);
+const PROGRAM_BYTES: usize = Program::<AXES>::len_of(2, 1);
 
-/// The axes and their program.
+/// What a press of the button runs.
+pub(crate) static PROGRAM: [u8; PROGRAM_BYTES] = Program {
+    name: "pairs, there and back",
+    steps: &experiment::steps(&generated::MOTORS, NETWORK.cycle),
+}
+.bytes();
+
+/// The axes as the group leads them.
 pub(crate) static GROUP: GroupConfig<AXES> = experiment::group(
     &generated::MOTORS,
     NETWORK.cycle,
     generated::TPDO_MISSING_LIMIT,
-    &STEPS,
 );

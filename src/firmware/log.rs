@@ -284,6 +284,8 @@ impl Log {
                 ..
             } => (Level::Warning, Line::Faulted(event)),
             GroupEvent::ReleaseRefused(_)
+            | GroupEvent::ProgramFailed(_)
+            | GroupEvent::MoveRefused(_)
             | GroupEvent::Coasting { .. }
             | GroupEvent::NotAtRest { .. }
             | GroupEvent::Lost { .. } => (Level::Warning, Line::Group(event)),

@@ -230,7 +230,7 @@ impl AxisPdos {
         let mut image = [0; IMAGE_BYTES];
         let [controlword, velocity, acceleration, deceleration] = self.commands;
         controlword.write(&mut image, command.controlword.to_le_bytes());
-        velocity.write(&mut image, command.velocity.to_le_bytes());
+        velocity.write(&mut image, command.target.to_le_bytes());
         acceleration.write(&mut image, command.acceleration.to_le_bytes());
         deceleration.write(&mut image, command.deceleration.to_le_bytes());
         image
@@ -253,6 +253,7 @@ impl AxisPdos {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::motion::mode::Mode;
     use crate::network::sample::SIX_EPOS4;
 
     fn pdos() -> [AxisPdos; 6] {
@@ -272,8 +273,9 @@ mod tests {
     }
 
     const COMMAND: AxisCommand = AxisCommand {
+        mode: Mode::ProfileVelocity,
         controlword: 0x000F,
-        velocity: -1200,
+        target: -1200,
         acceleration: 1500,
         deceleration: 0x0102_0304,
     };

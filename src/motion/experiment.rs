@@ -10,12 +10,13 @@
 //! ramp: at 800 rpm/s it is 6 ms before the end of the ramp, and the tail of a
 //! velocity loop of 10 ms, 8 rpm when the ramp ends, is cut by the advance.
 //!
-//! Everything is worked out by the compiler: [`steps`] and [`group`] are for
-//! statics.
+//! Everything is worked out by the compiler: [`steps`], [`group`] and
+//! [`Program::bytes`] are for statics.
 
-use super::group::{AxisConfig, GroupConfig};
+use super::mode::Mode;
 use super::position_control::Tuning;
 use super::program::{AxisMove, Program, Step};
+use super::{AxisConfig, GroupConfig};
 use crate::time::Duration;
 
 /// A motor with its encoder, gear and limits, as the network describes them.
@@ -51,10 +52,13 @@ impl Motor {
             increments_per_turn: turn,
             velocity_max: least(VELOCITY_MAX, self.max_speed),
             acceleration_max: least(ACCELERATION_MAX, self.max_acceleration),
-            travel_max: if -lower > upper { -lower } else { upper } as u32,
+            travel: (lower as i32, upper as i32),
             following_error_max: self.following_error(),
             in_position: 2,
             tuning: Tuning::for_cycle(cycle),
+            modes: Mode::EPOS4,
+            mode: Mode::ProfileVelocity,
+            torque_max: TORQUE_MAX,
         }
     }
 
@@ -105,6 +109,8 @@ const RAMP_MIN: u32 = 1000;
 const ACCELERATION_MAX: u32 = 4000;
 /// The drives' velocity loops take that long, microseconds; a longer cycle is long.
 const LONG_US: u32 = 10_000;
+/// Rated torque, per mille.
+const TORQUE_MAX: u16 = 1000;
 /// Turns of the motor from home.
 const TRAVEL_MAX: u32 = 1000;
 
@@ -220,12 +226,11 @@ const fn ramp_percent(cycle: Duration) -> u32 {
     WHOLE + MORE * LONG_US / if us > LONG_US { us } else { LONG_US }
 }
 
-/// The group of these axes that runs `steps`.
+/// The group of these axes.
 pub const fn group<const N: usize>(
     motors: &[Motor; N],
     cycle: Duration,
     missing_tpdo_max: u8,
-    steps: &'static [Step<N>],
 ) -> GroupConfig<N> {
     let mut axes = [Motor::SAMPLE.config(cycle); N];
     let mut stop_deceleration = STOP_DECELERATION;
@@ -240,10 +245,6 @@ pub const fn group<const N: usize>(
     GroupConfig {
         cycle,
         axes,
-        program: Program {
-            name: "pairs, there and back",
-            steps,
-        },
         // A drive may wait for standstill for 1 s on the way down (30E0h:3).
         enable_timeout: Duration::from_millis(2000),
         missing_tpdo_max,
@@ -263,4 +264,10 @@ const SAMPLE_CYCLE: Duration = Duration::from_millis(10);
 static SAMPLE_STEPS: [Step<6>; 3] = steps(&[Motor::SAMPLE; 6], SAMPLE_CYCLE);
 
 /// The group of six axes of the sample network, at a cycle of 10 ms.
-pub static GROUP: GroupConfig<6> = group(&[Motor::SAMPLE; 6], SAMPLE_CYCLE, 3, &SAMPLE_STEPS);
+pub static GROUP: GroupConfig<6> = group(&[Motor::SAMPLE; 6], SAMPLE_CYCLE, 3);
+
+/// What they run.
+pub static PROGRAM: Program<6> = Program {
+    name: "pairs, there and back",
+    steps: &SAMPLE_STEPS,
+};

@@ -1,31 +1,40 @@
-//! Motion: several axes as one group, moved in step.
+//! Motion: several axes as one group, moved in step; the contract is in
+//! `docs/motion.md`.
 //!
 //! [`Group`] is stepped once per SYNC cycle with what the drives reported and
-//! says what to command in the next one. It runs a [`Program`] once per
-//! release. Below it, a [`Profile`] gives each axis' reference and
-//! [`PositionControl`] turns it into the target velocity of profile velocity
-//! mode (60FFh): position control is closed here, in the master.
+//! says what to command in the next one. It evaluates a [`path`] for each axis and
+//! turns it into the target of the axis' [`mode`]: for profile velocity mode
+//! through [`PositionControl`], position control closed here, in the master.
+//! [`Director`] plans the paths, of single moves and of programs, in a task of low
+//! priority.
 //!
 //! Arithmetic is in integers where a value must be exact (positions, times in
 //! cycles) and in single precision elsewhere: the Cortex-M4F computes it in
 //! hardware.
 
+mod config;
+pub mod contract;
+mod director;
+mod event;
 pub mod experiment;
+mod fixed;
 mod group;
+pub mod mode;
+pub mod path;
+pub mod plan;
 mod position_control;
-mod profile;
 mod program;
-mod reference;
 mod scale;
 mod speedometer;
+pub mod units;
 
+pub use config::{AxisConfig, GroupConfig};
+pub use director::{Director, format};
+pub use event::{FaultCause, GroupEvent, GroupState, Refusal};
 pub use group::{
-    AxisCommand, AxisConfig, AxisFeedback, FaultCause, Group, GroupConfig, GroupEvent, GroupState,
-    Refusal, Request,
+    AxisCommand, AxisFeedback, AxisView, Group, Inputs, ModeWanted, Order, SetPoint, TooLate,
 };
 pub use position_control::{PositionControl, Tuning, Window};
-pub use profile::{Limits, NotFeasible, Profile, Setpoint, Timing};
 pub use program::{AxisMove, Limit, PlanError, Program, Step};
-pub use reference::{Ramp, Reference};
 pub use scale::Scale;
 pub use speedometer::Speedometer;

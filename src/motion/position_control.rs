@@ -16,7 +16,6 @@
 //!   velocity is exact and the last increment is reached. Inside the dead band
 //!   an axis whose reference rests is commanded 0: it does not hunt.
 
-use super::profile::Setpoint;
 use super::scale::Scale;
 use crate::time::Duration;
 
@@ -75,6 +74,38 @@ impl Tuning {
 /// interpolated by the drive (which shortens the lag as learned), simulated
 /// drives of 3 .. 10 ms end nearest to their targets with this value.
 const STOPPING_SHORT: f32 = 1.0;
+
+/// Where an axis should be at one moment.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Setpoint {
+    /// Position in increments, rounded toward the nearer end of the move; wraps
+    /// as 6064h does.
+    pub position: i32,
+    /// What the rounding left over, in increments: -1.0 .. 1.0.
+    pub fraction: f32,
+    /// Increments per cycle.
+    pub velocity: f32,
+    /// Increments per cycle squared.
+    pub acceleration: f32,
+}
+
+impl Setpoint {
+    /// At rest at `position`.
+    pub const fn at_rest(position: i32) -> Setpoint {
+        Setpoint {
+            position,
+            fraction: 0.0,
+            velocity: 0.0,
+            acceleration: 0.0,
+        }
+    }
+
+    /// Reference minus `position`, in increments: the error that the position
+    /// loop sees. Right across the wrap of the 32-bit position.
+    pub fn minus(&self, position: i32) -> f32 {
+        self.position.wrapping_sub(position) as f32 + self.fraction
+    }
+}
 
 /// The reference around one SYNC, as the position loop needs it.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,8 +1,11 @@
 //! Motion programs: a constant table that one release runs through once.
 
-use super::group::GroupConfig;
-use super::profile::{Limits, Timing};
+use super::format::VERSION;
+use super::path::Point;
+use super::plan::{self, Knots, Leg};
 use super::scale::Scale;
+use super::{AxisConfig, GroupConfig};
+use crate::sdo::Crc16;
 use crate::time::Duration;
 use crate::words::in_words;
 
@@ -56,6 +59,8 @@ pub enum Limit {
     Deceleration,
     /// Distance from home in increments.
     Target,
+    /// Torque, per mille of the rated one.
+    Torque,
 }
 
 in_words!(Limit {
@@ -63,6 +68,7 @@ in_words!(Limit {
     Limit::Acceleration => ("acceleration in rpm/s"),
     Limit::Deceleration => ("deceleration in rpm/s"),
     Limit::Target => ("target in increments from home"),
+    Limit::Torque => ("torque in per mille"),
 });
 
 /// Why a program cannot be run.
@@ -77,7 +83,8 @@ pub enum PlanError {
         limit: Limit,
         /// What the program asks for.
         value: i32,
-        /// Largest magnitude allowed (0 itself is allowed for the target only).
+        /// Largest magnitude allowed on this side (0 itself is allowed for the
+        /// target only).
         allowed: u32,
     },
     /// The move would take longer than the resolution of time allows.
@@ -100,11 +107,24 @@ in_words!(PlanError {
 impl core::error::Error for PlanError {}
 
 impl AxisMove {
-    /// Checks the move against the limits of its axis.
-    fn check<const N: usize>(&self, axis: u8, config: &GroupConfig<N>) -> Result<(), PlanError> {
-        let Some(limits) = config.axes.get(usize::from(axis)) else {
-            return Ok(());
-        };
+    /// The leg of a path, from rest at 0; its target as it stands here.
+    pub(super) fn leg(&self, scale: Scale) -> Leg {
+        Leg {
+            target: self.target,
+            velocity: scale.velocity(self.velocity as f32),
+            acceleration: scale.acceleration(self.acceleration as f32),
+            deceleration: scale.acceleration(self.deceleration as f32),
+            set: self.set,
+            ..Leg::default()
+        }
+    }
+
+    /// Checks the move against the limits of its axis, its target only if it is
+    /// `absolute`.
+    ///
+    /// # Errors
+    /// [`PlanError`] for the first value that breaks a limit.
+    pub fn keeps(&self, axis: u8, limits: &AxisConfig, absolute: bool) -> Result<(), PlanError> {
         let checks = [
             (Limit::Velocity, self.velocity, limits.velocity_max),
             (
@@ -128,57 +148,89 @@ impl AxisMove {
                 });
             }
         }
-        if self.target.unsigned_abs() > limits.travel_max {
-            return Err(PlanError::OutOfLimits {
-                axis,
-                limit: Limit::Target,
-                value: self.target,
-                allowed: limits.travel_max,
-            });
+        if absolute {
+            limits.reaches(axis, self.target)?;
         }
         Ok(())
     }
-
-    /// The shortest phases of the move over `distance` increments.
-    fn timing(&self, axis: u8, distance: i32, scale: Scale) -> Result<Timing, PlanError> {
-        let limits = Limits {
-            velocity: scale.velocity(self.velocity as f32),
-            acceleration: scale.acceleration(self.acceleration as f32),
-            deceleration: scale.acceleration(self.deceleration as f32),
-        };
-        Timing::shortest(distance, &limits).map_err(|_| PlanError::TooLong { axis })
-    }
 }
 
-/// Phases for each axis of a move from `from` (increments from home), those of
-/// the same set sharing theirs. Axes without a part in the move get no phases.
-///
-/// # Errors
-/// [`PlanError`] for the first axis whose part breaks a limit.
-pub(super) fn plan<const N: usize>(
-    moves: &[Option<AxisMove>; N],
-    from: &[i32; N],
-    config: &GroupConfig<N>,
-) -> Result<[Timing; N], PlanError> {
-    let mut timings = [Timing::default(); N];
-    for (axis, ((part, from), timing)) in (0u8..).zip(moves.iter().zip(from).zip(&mut timings)) {
-        let Some(part) = part else { continue };
-        part.check(axis, config)?;
-        *timing = part.timing(axis, part.target.wrapping_sub(*from), config.scale(axis))?;
-    }
-    let alone = timings;
-    for (part, timing) in moves.iter().zip(&mut timings) {
-        let Some(part) = part else { continue };
-        for (other, other_timing) in moves.iter().zip(&alone) {
-            if other.is_some_and(|o| o.set == part.set) {
-                *timing = timing.together(*other_timing);
-            }
+/// The axes that have a part: bit n for axis n.
+const fn axes<const N: usize>(moves: &[Option<AxisMove>; N]) -> u32 {
+    let (mut axes, mut bit) = (0, 1);
+    let mut left: &[Option<AxisMove>] = moves;
+    while let Some((part, others)) = left.split_first() {
+        if part.is_some() {
+            axes |= bit;
         }
+        bit <<= 1;
+        left = others;
     }
-    Ok(timings)
+    axes
+}
+
+/// Writes the lowest bytes of `value`; what is left behind them.
+const fn put(bytes: &mut [u8], value: u32, size: u8) -> &mut [u8] {
+    let (mut left, mut value, mut size) = (bytes, value, size);
+    while size > 0 {
+        let Some((byte, more)) = left.split_first_mut() else {
+            return &mut [];
+        };
+        *byte = value as u8;
+        (left, value, size) = (more, value >> u8::BITS, size - 1);
+    }
+    left
 }
 
 impl<const N: usize> Program<N> {
+    /// Bytes of a program with so many moves of all axes and so many dwells.
+    pub const fn len_of(moves: usize, dwells: usize) -> usize {
+        const FRAME: usize = 6;
+        const MOVE: usize = 8;
+        const PART: usize = 17;
+        const WAIT: usize = 5;
+        FRAME + moves * (MOVE + N * PART) + dwells * WAIT
+    }
+
+    /// The program as [`format`](crate::motion::format) has it; `BYTES` is to be
+    /// [`len_of`](Self::len_of) its steps.
+    pub const fn bytes<const BYTES: usize>(&self) -> [u8; BYTES] {
+        const MOVE: u32 = 1;
+        const WAIT: u32 = 2;
+        const FRAME: u32 = 6;
+        let mut bytes = [0; BYTES];
+        let mut left = put(&mut bytes, VERSION as u32, 1);
+        left = put(left, N as u32, 1);
+        left = put(left, BYTES as u32 - FRAME, 2);
+        let mut steps = self.steps;
+        while let Some((step, others)) = steps.split_first() {
+            left = match step {
+                Step::Dwell(time) => put(put(left, WAIT, 1), time.as_millis(), 4),
+                Step::Move(moves) => {
+                    left = put(put(left, MOVE, 2), axes(moves), 2);
+                    left = put(left, 0, 4);
+                    let mut parts: &[Option<AxisMove>] = moves;
+                    while let Some((part, more)) = parts.split_first() {
+                        if let Some(part) = part {
+                            left = put(left, part.target as u32, 4);
+                            left = put(left, part.velocity, 4);
+                            left = put(left, part.acceleration, 4);
+                            left = put(left, part.deceleration, 4);
+                            left = put(left, part.set as u32, 1);
+                        }
+                        parts = more;
+                    }
+                    left
+                }
+            };
+            steps = others;
+        }
+        if let Some((all, crc)) = bytes.split_last_chunk_mut() {
+            *crc = Crc16::new().update(all).get().to_le_bytes();
+        }
+        bytes
+    }
+
     /// Checks every move against the limits in `config` and sums up how long one
     /// run takes when it starts from home.
     ///
@@ -189,18 +241,27 @@ impl<const N: usize> Program<N> {
     /// # Errors
     /// [`PlanError`] for the first move that cannot be carried out.
     pub fn duration(&self, config: &GroupConfig<N>) -> Result<Duration, PlanError> {
-        let mut from = [0; N];
+        let mut at = [0; N];
         let mut cycles = 0u64;
         for step in self.steps {
             match step {
                 Step::Dwell(time) => cycles += u64::from(config.cycles(*time)),
                 Step::Move(moves) => {
-                    let timings = plan(moves, &from, config)?;
-                    let longest = timings.iter().map(Timing::total).max().unwrap_or(0);
-                    cycles += u64::from(longest) + SETTLING_CYCLES;
-                    for (from, part) in from.iter_mut().zip(moves) {
-                        *from = part.map_or(*from, |p| p.target);
+                    let mut legs = [None; N];
+                    let parts = moves.iter().zip(&mut legs).zip(&mut at).zip(&config.axes);
+                    for (axis, (((part, leg), at), limits)) in (0..).zip(parts) {
+                        let Some(part) = part else { continue };
+                        part.keeps(axis, limits, true)?;
+                        let from = core::mem::replace(at, part.target);
+                        *leg = Some(Leg {
+                            from: Point::at_rest(from),
+                            ..part.leg(config.scale(axis))
+                        });
                     }
+                    let mut knots = [const { Knots::new() }; N];
+                    let longest = plan::plan(&legs, &mut knots);
+                    let longest = longest.map_err(|late| PlanError::TooLong { axis: late.leg })?;
+                    cycles += u64::from(longest) + SETTLING_CYCLES;
                 }
             }
         }
@@ -210,5 +271,5 @@ impl<const N: usize> Program<N> {
 }
 
 /// Cycles between the end of a move's reference and the next step when nothing
-/// disturbs the axes: delay of the loop, last increments, confirmation.
-const SETTLING_CYCLES: u64 = 12;
+/// disturbs the axes: delay of the loop, last increments, confirmation, planning.
+const SETTLING_CYCLES: u64 = 14;

@@ -30,8 +30,13 @@ impl Crc16 {
 
     /// Of the data so far and `data`.
     #[must_use]
-    pub fn update(self, data: &[u8]) -> Crc16 {
-        Crc16(data.iter().fold(self.0, |crc, &byte| step(crc, byte)))
+    pub const fn update(self, data: &[u8]) -> Crc16 {
+        let (mut crc, mut left) = (self.0, data);
+        while let Some((byte, others)) = left.split_first() {
+            crc = step(crc, *byte);
+            left = others;
+        }
+        Crc16(crc)
     }
 
     /// The checksum.

@@ -1,22 +1,22 @@
 //! Axes whose optional nodes are not there.
 
 use canmaster::cia402::{Command, ControlWord};
-use canmaster::motion::{FaultCause, GroupEvent, GroupState, Request};
+use canmaster::motion::{FaultCause, GroupEvent, GroupState, Inputs, Order};
 
-use crate::rig::{AXES, READY, Rig};
+use crate::rig::{AXES, READY, Rig, far};
 
 const AXIS: usize = 3;
-const WITHOUT: Request = Request {
+const WITHOUT: Inputs = Inputs {
     absent: 1 << AXIS,
     ..READY
 };
 
-fn run(rig: &mut Rig, request: Request, to: GroupState, cycles: u32) {
+fn run(rig: &mut Rig, request: Inputs, to: GroupState, cycles: u32) {
     let came = (0..cycles).any(|_| {
         rig.step(request);
         rig.group.state() == to
     });
-    assert!(came, "{to} is not reached: {:?}", rig.events);
+    assert!(came, "{to} is not reached: {}", rig.last());
 }
 
 /// In standby without the axis.
@@ -27,12 +27,12 @@ fn standby() -> Rig {
     rig
 }
 
-fn release(rig: &mut Rig, request: Request) {
-    rig.step(Request {
-        release: true,
-        ..request
-    });
-    assert_eq!(rig.group.state(), GroupState::Moving, "{:?}", rig.events);
+fn release(rig: &mut Rig, inputs: Inputs) {
+    rig.order(Order::Release);
+    rig.step(inputs);
+    assert_eq!(rig.group.state(), GroupState::Moving, "{}", rig.last());
+    rig.go(far);
+    rig.step(inputs);
 }
 
 #[test]
@@ -45,14 +45,13 @@ fn the_others_are_enabled_and_moved_without_it() {
         let command = rig.commands[AXIS];
         assert!(!ControlWord(command.controlword).gives(Command::EnableOperation));
         for (turned, command) in turned.iter_mut().zip(&rig.commands) {
-            *turned |= command.velocity != 0;
+            *turned |= command.target != 0;
         }
     }
     for (axis, turned) in turned.into_iter().enumerate() {
         assert_eq!(turned, axis != AXIS, "axis {axis}");
     }
-    assert!(rig.events.contains(&GroupEvent::ProgramDone));
-    assert_eq!(rig.group.state(), GroupState::Standby);
+    assert!(rig.group.all_arrived());
     let faults = rig.events.iter();
     let faults = faults.filter(|event| matches!(event, GroupEvent::Fault { .. }));
     assert_eq!(faults.count(), 0);
@@ -72,7 +71,7 @@ fn one_that_goes_in_motion_stops_all_and_is_left_out_then() {
     run(&mut rig, WITHOUT, GroupState::Standby, 100);
     for _ in 0..500 {
         rig.step(WITHOUT);
-        assert!(rig.commands.iter().all(|command| command.velocity == 0));
+        assert!(rig.commands.iter().all(|command| command.target == 0));
     }
     release(&mut rig, WITHOUT);
 }
@@ -85,7 +84,11 @@ fn one_that_comes_waits_for_standby_and_is_enabled_with_the_others() {
     rig.events.clear();
     for _ in 0..1500 {
         rig.step(READY);
-        assert_eq!(rig.commands[AXIS].velocity, 0);
+        assert_eq!(rig.commands[AXIS].target, 0);
+    }
+    rig.order(Order::Finish);
+    for _ in 0..50 {
+        rig.step(READY);
     }
     let entered = rig.events.iter().filter_map(|event| match event {
         GroupEvent::State { to, .. } => Some(*to),
@@ -98,17 +101,17 @@ fn one_that_comes_waits_for_standby_and_is_enabled_with_the_others() {
         GroupState::Standby,
     ];
     assert_eq!(entered, expected, "no stop in between");
-    rig.release();
+    release(&mut rig, READY);
     for _ in 0..100 {
         rig.step(READY);
     }
-    assert_ne!(rig.commands[AXIS].velocity, 0);
+    assert_ne!(rig.commands[AXIS].target, 0);
 }
 
 #[test]
 fn a_fault_of_another_axis_is_not_forgiven_by_it() {
     let mut rig = Rig::moving(3, 100);
-    rig.step(Request {
+    rig.step(Inputs {
         fault: Some((AXIS + 1, FaultCause::HeartbeatLost)),
         ..READY
     });

@@ -1,307 +1,210 @@
-//! The group's contract: every event in every state, and what follows.
+//! The contract's sentences, each against drives.
 
 use canmaster::cia402::{Command, ControlWord, State};
-use canmaster::motion::experiment::GROUP;
-use canmaster::motion::{FaultCause, GroupEvent, GroupState, Refusal, Request};
+use canmaster::motion::mode::Mode;
+use canmaster::motion::{FaultCause, GroupEvent, GroupState, Limit, PlanError, Refusal};
+use canmaster::motion::{Inputs, Order};
 
-use crate::rig::{AXES, READY, Rig};
+use crate::rig::{ALL, AXES, READY, Rig, far};
 
-use GroupState::{Enabling, FaultStop, Faulted, Idle, Moving, Standby, Stopping};
+use GroupState::*;
 
+const AXIS: usize = 3;
 /// Cycles into the move at which the axes are fast.
 const FAST: u32 = 100;
-/// The axis that things happen to.
-const AXIS: usize = 3;
 
-const STATES: [GroupState; 7] = [
-    Idle, Enabling, Standby, Moving, Stopping, FaultStop, Faulted,
-];
-
-const HEARTBEAT_LOST: Request = Request {
-    fault: Some((AXIS, FaultCause::HeartbeatLost)),
-    ..READY
-};
-const DOWN: Request = Request {
-    network_ready: false,
-    ..READY
-};
-const RELEASE: Request = Request {
-    release: true,
-    ..READY
-};
-const STOP: Request = Request {
-    stop: true,
-    ..READY
-};
-
-/// A group that has just come to `state`.
-fn in_state(state: GroupState) -> Rig {
-    let mut rig = match state {
-        Idle => Rig::new(1),
-        Enabling => {
-            let mut rig = Rig::new(1);
-            for _ in 0..5 {
-                rig.step(READY);
-            }
-            rig
-        }
-        Standby => Rig::standby(1),
-        Moving => Rig::moving(1, FAST),
-        Stopping => {
-            let mut rig = Rig::moving(1, FAST);
-            rig.step(STOP);
-            rig
-        }
-        FaultStop | Faulted => {
-            let mut rig = Rig::moving(1, FAST);
-            rig.step(HEARTBEAT_LOST);
-            if state == Faulted {
-                assert!(rig.until(Faulted, 300) > 0);
-            }
-            rig
-        }
-    };
-    assert_eq!(rig.group.state(), state);
-    rig.events.clear();
-    rig
+/// Contract 1: whatever is wrong, no release, and nothing moves.
+#[test]
+fn a_release_is_refused_with_its_reason() {
+    let mut rig = Rig::new(8);
+    assert_eq!(rig.group.order(Order::Release), Err(Refusal::NotIn(Idle)));
+    rig.until(Standby, 100);
+    rig.silent[AXIS] = true;
+    rig.step(READY);
+    let why = rig.group.order(Order::Release);
+    assert_eq!(why, Err(Refusal::NotFresh { axis: AXIS as u8 }));
+    rig.silent[AXIS] = false;
+    rig.drives[AXIS].velocity = 20.0;
+    rig.step(READY);
+    let why = rig.group.order(Order::Release);
+    assert!(
+        matches!(why, Err(Refusal::NotAtRest { axis: 3, .. })),
+        "{why:?}"
+    );
+    let parts = core::array::from_fn(|n| Some(far(n)));
+    let why = rig.director.go(&rig.group, &parts, false, 0);
+    assert_eq!(why, Err(Refusal::NotIn(Standby)));
+    for _ in 0..50 {
+        rig.step(READY);
+        assert!(rig.commands.iter().all(|command| command.target == 0));
+    }
+    assert_eq!(rig.group.state(), Standby);
 }
 
-/// What can happen, and in how many cycles the group has to notice.
-type Happening = (&'static str, fn(&mut Rig, Request), u32);
-
-const HAPPENINGS: [Happening; 10] = [
-    ("network down", |rig, _| rig.step(DOWN), 1),
-    (
-        "release",
-        |rig, calm| {
-            rig.step(Request {
-                release: true,
-                ..calm
-            })
-        },
-        1,
-    ),
-    (
-        "stop",
-        |rig, calm| rig.step(Request { stop: true, ..calm }),
-        1,
-    ),
-    (
-        "release and stop",
-        |rig, calm| {
-            rig.step(Request {
-                release: true,
-                stop: true,
-                ..calm
-            })
-        },
-        1,
-    ),
-    (
-        "heartbeat lost",
-        |rig, calm| {
-            rig.step(Request {
-                fault: HEARTBEAT_LOST.fault,
-                ..calm
-            })
-        },
-        1,
-    ),
-    (
-        "emergency",
-        |rig, calm| {
-            let cause = FaultCause::Emergency { code: 0x2310 };
-            rig.step(Request {
-                fault: Some((AXIS, cause)),
-                ..calm
-            });
-        },
-        1,
-    ),
-    (
-        "drive fault",
-        |rig, calm| {
-            rig.drives[AXIS].fail();
-            rig.step(calm);
-        },
-        1,
-    ),
-    (
-        "enable input lost",
-        |rig, calm| {
-            rig.drives[AXIS].state = State::SwitchOnDisabled;
-            rig.step(calm);
-        },
-        1,
-    ),
-    (
-        "TPDOs missing",
-        |rig, calm| {
-            rig.silent[AXIS] = true;
-            rig.step(calm);
-        },
-        3,
-    ),
-    (
-        "torn away",
-        |rig, calm| {
-            rig.drives[AXIS].position += 1000.0;
-            rig.step(calm);
-        },
-        1,
-    ),
-];
-
-/// The state after each happening, in the order of [`STATES`].
-const TABLE: [[GroupState; 7]; 10] = [
-    [
-        Idle, FaultStop, FaultStop, FaultStop, FaultStop, FaultStop, Faulted,
-    ],
-    [Idle, Enabling, Moving, Moving, Stopping, FaultStop, Faulted],
-    [
-        Idle, Enabling, Standby, Stopping, Stopping, FaultStop, Faulted,
-    ],
-    [
-        Idle, Enabling, Standby, Stopping, Stopping, FaultStop, Faulted,
-    ],
-    [
-        Idle, FaultStop, FaultStop, FaultStop, FaultStop, FaultStop, Faulted,
-    ],
-    [
-        Idle, FaultStop, FaultStop, FaultStop, FaultStop, FaultStop, Faulted,
-    ],
-    [
-        Idle, FaultStop, FaultStop, FaultStop, FaultStop, FaultStop, Faulted,
-    ],
-    // While enabling, the axis is led up again.
-    [
-        Idle, Enabling, FaultStop, FaultStop, FaultStop, FaultStop, Faulted,
-    ],
-    [
-        Idle, FaultStop, FaultStop, FaultStop, FaultStop, FaultStop, Faulted,
-    ],
-    // Before it is enabled an axis has no reference to be torn away from.
-    [
-        Idle, Enabling, FaultStop, FaultStop, FaultStop, FaultStop, Faulted,
-    ],
-];
-
-/// The only transitions that lead to `Moving` and to `Stopping` are the release
-/// in standby and the stop in motion; the state after a fault never leads back.
+/// Contract 5: axis, value and limit, and nothing is sent.
 #[test]
-fn every_event_in_every_state() {
-    for ((name, happen, cycles), row) in HAPPENINGS.iter().zip(TABLE) {
-        for (state, expected) in STATES.into_iter().zip(row) {
-            let mut rig = in_state(state);
-            let calm = if state == Idle { DOWN } else { READY };
-            for cycle in 0..*cycles {
-                let before = rig.group.state();
-                let unnoticed = before == state || before == Enabling;
-                assert!(unnoticed, "{name} in {state}: {before} after {cycle}");
-                happen(&mut rig, calm);
-            }
-            assert_eq!(rig.group.state(), expected, "{name} in {state}");
-
-            let refused = rig
-                .events
-                .iter()
-                .any(|e| matches!(e, GroupEvent::ReleaseRefused(_)));
-            let released = name.starts_with("release");
-            let accepted = state == Standby && expected == Moving;
-            assert_eq!(refused, released && !accepted, "{name} in {state}");
-
-            // And whatever follows by itself ends in a state of rest.
-            let last = match expected {
-                Idle => Idle,
-                // Down and up again: the way out.
-                FaultStop | Faulted if *name == "network down" => Standby,
-                FaultStop | Faulted => Faulted,
-                Enabling | Standby | Moving | Stopping => Standby,
-            };
-            for _ in 0..1500 {
-                rig.step(calm);
-                if expected != Moving {
-                    assert_ne!(rig.group.state(), Moving, "{name} in {state}");
+fn a_target_outside_the_limits_is_refused() {
+    let mut rig = Rig::standby(1);
+    rig.released();
+    for (change, limit, allowed) in [
+        (0, Limit::Velocity, 2200),
+        (1, Limit::Acceleration, 4000),
+        (2, Limit::Deceleration, 4000),
+        (3, Limit::Target, 2_000_000),
+    ] {
+        let parts = core::array::from_fn(|n| {
+            let mut part = far(n);
+            if n == AXIS {
+                match change {
+                    0 => part.velocity = 2201,
+                    1 => part.acceleration = 4001,
+                    2 => part.deceleration = 4001,
+                    _ => part.target = -2_000_001,
                 }
             }
-            assert_eq!(
-                rig.group.state(),
-                last,
-                "{name} in {state}: {:?}",
-                rig.events
-            );
-            assert!(rig.standing(), "{name} in {state}");
-        }
+            Some(part)
+        });
+        let Err(Refusal::Program(PlanError::OutOfLimits {
+            axis,
+            limit: broken,
+            value,
+            allowed: most,
+        })) = rig.director.go(&rig.group, &parts, false, 0)
+        else {
+            panic!("not refused");
+        };
+        assert_eq!((axis, broken, most), (AXIS as u8, limit, allowed));
+        assert_eq!(value.unsigned_abs(), allowed + 1);
+    }
+    for _ in 0..20 {
+        rig.step(READY);
+        assert!(rig.commands.iter().all(|command| command.target == 0));
     }
 }
 
-/// Contract 2: the step that detects carries the stop, all commands fall from
+/// An axis that cannot brake before its target goes beyond it: not if that is
+/// outside of its travel.
+#[test]
+fn turning_around_outside_of_the_travel_is_refused() {
+    let mut rig = Rig::standby(1);
+    rig.released();
+    let part = |target| {
+        let mut parts = [None; AXES];
+        parts[0] = Some(canmaster::motion::AxisMove {
+            target,
+            velocity: 2000,
+            acceleration: 4000,
+            deceleration: 4000,
+            set: 0,
+        });
+        parts
+    };
+    rig.director
+        .go(&rig.group, &part(2_000_000), false, 0)
+        .unwrap();
+    let home = rig.group.view(0).unwrap().home;
+    while rig.group.view(0).unwrap().reference - home < 1_984_000 {
+        rig.step(READY);
+        assert!(rig.cycle < 4000, "{}", rig.last());
+    }
+    let mut slower = part(1_985_000);
+    slower[0].as_mut().unwrap().deceleration = 100;
+    rig.director.go(&rig.group, &slower, false, 0).unwrap();
+    rig.step(READY);
+    assert!(
+        matches!(
+            rig.notices.last(),
+            Some(GroupEvent::MoveRefused(PlanError::OutOfLimits {
+                axis: 0,
+                limit: Limit::Target,
+                ..
+            }))
+        ),
+        "{:?}",
+        rig.notices
+    );
+    rig.arrive(1000);
+    assert!((rig.drives[0].position - f64::from(home + 2_000_000)).abs() <= 3.0);
+}
+
+/// Contract 2: the step that detects carries the stop, the commands fall from
 /// there on, and the axes that still obey come to rest in the same cycle.
 #[test]
 fn a_fault_stops_all_axes_together() {
-    for (name, happen, cycles) in HAPPENINGS {
-        let mut rig = Rig::moving(7, FAST);
-        for _ in 0..cycles {
-            assert_eq!(rig.group.state(), Moving);
-            happen(&mut rig, READY);
+    for mode in [
+        Mode::ProfileVelocity,
+        Mode::CyclicVelocity,
+        Mode::CyclicPosition,
+    ] {
+        let mut rig = if mode == Mode::ProfileVelocity {
+            Rig::standby(7)
+        } else {
+            Rig::in_mode(7, mode)
+        };
+        rig.released();
+        rig.go(far);
+        for _ in 0..FAST {
+            rig.step(READY);
         }
-        if rig.group.state() != FaultStop {
-            continue;
-        }
-        // The way out of the fault would begin at once.
-        let calm = if name == "network down" { DOWN } else { READY };
-        let mut before = rig.commands.map(|c| c.velocity);
-        let mut at_zero = [None; AXES];
-        // A fifth of the fastest axis' speed per cycle would be 15 000 rpm/s.
+        let mut targets = rig.commands.map(|command| command.target);
+        rig.step(READY);
+        let mut speeds: [i32; AXES] = core::array::from_fn(|n| {
+            let now = rig.commands[n].target;
+            let before = core::mem::replace(&mut targets[n], now);
+            if mode == Mode::CyclicPosition {
+                now - before
+            } else {
+                now
+            }
+        });
+        let lost = FaultCause::HeartbeatLost;
+        rig.step(Inputs {
+            fault: Some((AXIS, lost)),
+            ..READY
+        });
+        assert_eq!(rig.group.state(), FaultStop);
+        let axis = Some(AXIS as u8);
+        assert!(
+            rig.events
+                .contains(&GroupEvent::Fault { axis, cause: lost })
+        );
+        let mut ended = [0; AXES];
         for cycle in 0..60 {
-            for (n, (command, before)) in rig.commands.iter().zip(&before).enumerate() {
-                let now = command.velocity;
-                assert!(now.abs() <= before.abs() && now * before >= 0, "{name}");
+            for n in 0..AXES {
+                let now = rig.commands[n].target;
+                let before = core::mem::replace(&mut targets[n], now);
+                let speed = if mode == Mode::CyclicPosition {
+                    now - before
+                } else {
+                    now
+                };
                 assert!(
-                    now != *before || now.abs() <= 1 || cycle == 0,
-                    "{name} axis {n}"
+                    speed.abs() <= speeds[n].abs() + 1,
+                    "{mode} {n} {cycle}: {speed}"
                 );
-                if now == 0 && at_zero[n].is_none() {
-                    at_zero[n] = Some(cycle);
+                assert!(
+                    speed != speeds[n] || speed.abs() <= 5 || cycle > 0,
+                    "{mode} {n}"
+                );
+                speeds[n] = speed;
+                if speed != 0 {
+                    ended[n] = cycle;
                 }
             }
-            before = rig.commands.map(|c| c.velocity);
-            rig.step(calm);
+            rig.step(READY);
         }
-        let obeying: Vec<_> = (0..AXES)
-            .filter(|n| rig.drives[*n].state == State::OperationEnabled || *n != AXIS)
-            .filter_map(|n| at_zero[n])
-            .collect();
-        assert!(obeying.len() >= AXES - 1, "{name}");
-        let first = obeying.iter().min().unwrap();
-        let last = obeying.iter().max().unwrap();
-        // Whole rpm: the slower axes round to 0 up to a cycle earlier.
-        assert!(last - first <= 1, "{name}: {at_zero:?}");
+        let (first, last) = (ended.iter().min().unwrap(), ended.iter().max().unwrap());
+        assert!(last - first <= 2, "{mode}: {ended:?}");
         for _ in 0..200 {
-            rig.step(calm);
+            rig.step(READY);
         }
-        assert_eq!(rig.group.state(), Faulted, "{name}");
-        assert!(rig.all(State::SwitchOnDisabled) || rig.drives[AXIS].state == State::Fault);
+        assert_eq!(rig.group.state(), Faulted);
+        assert!(rig.all(State::SwitchOnDisabled) && rig.standing());
     }
 }
 
-/// The very command of the detecting step is slower than the one before.
-#[test]
-fn the_detecting_step_carries_the_stop() {
-    let mut rig = Rig::moving(3, FAST);
-    let before = rig.commands.map(|c| c.velocity.abs());
-    rig.step(HEARTBEAT_LOST);
-    for (command, before) in rig.commands.iter().zip(before) {
-        assert!(command.velocity.abs() < before);
-    }
-    assert!(rig.events.contains(&GroupEvent::Fault {
-        axis: Some(AXIS as u8),
-        cause: FaultCause::HeartbeatLost
-    }));
-}
-
-/// An axis disabled by its own drive is left out: nothing that is sent to it
-/// could enable it again, and the log says that it coasts.
+/// An axis disabled by its own drive is left out: nothing that is sent to it could
+/// enable it again, and the log says that it coasts.
 #[test]
 fn a_failed_axis_is_left_to_its_drive() {
     let mut rig = Rig::moving(5, FAST);
@@ -310,7 +213,7 @@ fn a_failed_axis_is_left_to_its_drive() {
         rig.step(READY);
         let command = rig.commands[AXIS];
         let word = ControlWord(command.controlword);
-        assert_eq!(command.velocity, 0);
+        assert_eq!(command.target, 0);
         assert!(!word.gives(Command::EnableOperation) && !word.gives(Command::FaultReset));
     }
     let coasting = rig.events.iter().filter(
@@ -319,164 +222,231 @@ fn a_failed_axis_is_left_to_its_drive() {
     assert_eq!(coasting.count(), 1);
 }
 
-/// Contract 3: out of a fault leads only a network that went down and came up;
-/// it leads to standby, and the next release starts where the axes are.
+/// Contract 3: a reset, or a network that went down and came up, leads to standby
+/// and not to motion.
 #[test]
 fn recovery_leads_to_standby_and_not_to_motion() {
-    let mut rig = in_state(Faulted);
-    for _ in 0..100 {
-        rig.step(RELEASE);
-        assert_eq!(rig.group.state(), Faulted);
+    for reset in [false, true] {
+        let mut rig = Rig::moving(6, FAST);
+        rig.drives[AXIS].fail();
+        rig.until(Faulted, 300);
+        for _ in 0..50 {
+            rig.step(READY);
+            assert_eq!(
+                rig.group.order(Order::Release),
+                Err(Refusal::NotIn(Faulted))
+            );
+        }
+        if reset {
+            rig.order(Order::Reset);
+        } else {
+            rig.step(Inputs {
+                network_ready: false,
+                ..READY
+            });
+        }
+        rig.step(READY);
+        assert_eq!(rig.group.state(), Enabling);
+        let gives =
+            |rig: &Rig| ControlWord(rig.commands[AXIS].controlword).gives(Command::FaultReset);
+        let (mut low, mut high) = (!gives(&rig), false);
+        while rig.group.state() != Standby {
+            rig.step(READY);
+            high |= low && gives(&rig);
+            low |= !gives(&rig);
+            assert!(rig.commands.iter().all(|c| c.target == 0));
+        }
+        assert!(high, "bit 7 low, then high");
+        let places = rig.drives.each_ref().map(|d| d.position);
+        for _ in 0..200 {
+            rig.step(READY);
+            assert_eq!(rig.group.state(), Standby);
+        }
+        for (drive, place) in rig.drives.iter().zip(places) {
+            assert!((drive.position - place).abs() < 1.0);
+        }
+        rig.released();
+        rig.go(far);
+        rig.arrive(1500);
     }
-    rig.step(DOWN);
+}
+
+#[test]
+fn a_reset_without_network_is_refused() {
+    let mut rig = Rig::moving(6, FAST);
+    let down = Inputs {
+        network_ready: false,
+        ..READY
+    };
+    for _ in 0..300 {
+        rig.step(down);
+    }
     assert_eq!(rig.group.state(), Faulted);
+    assert_eq!(rig.group.order(Order::Reset), Err(Refusal::NetworkNotReady));
+}
+
+/// A stop in motion: the axes rest together, and the next release begins there.
+#[test]
+fn a_stop_is_coordinated_and_leads_to_standby() {
+    let mut rig = Rig::moving(9, FAST);
+    let before = rig.commands.map(|c| c.target.abs());
+    rig.order(Order::Stop);
     rig.step(READY);
-    assert_eq!(rig.group.state(), Enabling);
-    while rig.group.state() != Standby {
-        rig.step(READY);
-        assert!(rig.commands.iter().all(|c| c.velocity == 0));
+    assert_eq!(rig.group.state(), Stopping);
+    for (command, before) in rig.commands.iter().zip(before) {
+        assert!(command.target.abs() < before);
     }
-    let places = rig.drives.each_ref().map(|d| d.position);
-    for _ in 0..200 {
-        rig.step(READY);
-        assert_eq!(rig.group.state(), Standby);
-    }
-    for (drive, place) in rig.drives.iter().zip(places) {
-        assert!((drive.position - place).abs() < 1.0);
-    }
-    rig.release();
-    assert_eq!(rig.group.state(), Moving);
-    assert!(rig.until(Standby, 1500) > 0, "{:?}", rig.events);
+    rig.until(Standby, 200);
+    let stops = rig.observed.map(|o| o.stopped_ms);
+    let first = stops.iter().copied().fold(f64::MAX, f64::min);
+    let last = stops.iter().copied().fold(0.0, f64::max);
+    assert!(last - first < 10.0, "{stops:?}");
+    rig.released();
+    rig.go(far);
+    rig.arrive(1500);
 }
 
-/// An axis that still turns when it is enabled is braked first: standby holds the
-/// place where it has come to rest.
 #[test]
-fn standby_waits_until_every_axis_stands() {
-    let mut rig = in_state(Idle);
-    rig.drives[AXIS].velocity = 1500.0;
-    assert!(rig.until(Standby, 300) > 0, "{:?}", rig.events);
-    assert!(rig.drives[AXIS].velocity.abs() < 10.0);
-    for _ in 0..200 {
+fn halt_waits_for_a_release_and_stop_ends_it() {
+    let mut rig = Rig::moving(9, FAST);
+    rig.order(Order::Halt);
+    for _ in 0..300 {
         rig.step(READY);
-        assert_eq!(rig.group.state(), Standby, "{:?}", rig.events);
+        assert_eq!(rig.group.state(), Halt);
     }
+    assert!(rig.standing());
+    rig.released();
+    rig.go(far);
+    for _ in 0..50 {
+        rig.step(READY);
+    }
+    rig.order(Order::Halt);
+    rig.step(READY);
+    rig.order(Order::Stop);
+    rig.until(Standby, 200);
 }
 
-/// Faults of the past are reset on the way up.
 #[test]
-fn enabling_resets_old_faults() {
-    let mut rig = Rig::new(2);
-    rig.drives[AXIS].fail();
-    assert!(rig.until(Standby, 100) > 0, "{:?}", rig.events);
+fn disable_and_enable() {
+    let mut rig = Rig::moving(2, FAST);
+    rig.order(Order::Disable);
+    rig.until(Idle, 300);
+    assert_eq!(rig.states()[3..], [Stopping, Standby, Disabling, Idle]);
+    assert!(rig.all(State::SwitchOnDisabled));
+    for _ in 0..50 {
+        rig.step(READY);
+        assert_eq!(rig.group.state(), Idle);
+    }
+    rig.order(Order::Enable);
+    rig.until(Standby, 100);
 }
 
-/// A drive that stays in one state is named with it, and nothing was enabled
-/// alone: all others wait below.
+#[test]
+fn a_quick_stop_is_made_by_the_drives_and_disables() {
+    let mut rig = Rig::moving(2, FAST);
+    rig.order(Order::QuickStop);
+    rig.until(Idle, 300);
+    assert!(rig.states().ends_with(&[QuickStop, Disabling, Idle]));
+    assert!(rig.standing() && rig.all(State::SwitchOnDisabled));
+    let faults = rig
+        .events
+        .iter()
+        .filter(|e| matches!(e, GroupEvent::Fault { .. }));
+    assert_eq!(faults.count(), 0);
+}
+
+/// In every state that waits for a drive, a drive that does not follow ends in the
+/// state that the contract names.
 #[test]
 fn a_drive_that_does_not_follow_is_named() {
-    let stuck = [
-        (State::NotReadyToSwitchOn, State::SwitchOnDisabled),
-        (State::SwitchOnDisabled, State::ReadyToSwitchOn),
-        (State::ReadyToSwitchOn, State::SwitchedOn),
-        (State::SwitchedOn, State::OperationEnabled),
-        (State::Fault, State::SwitchOnDisabled),
-    ];
-    for (state, others) in stuck {
+    for state in [
+        State::NotReadyToSwitchOn,
+        State::SwitchOnDisabled,
+        State::ReadyToSwitchOn,
+        State::SwitchedOn,
+        State::Fault,
+    ] {
         let mut rig = Rig::new(4);
         if state == State::Fault {
             rig.drives[AXIS].fail();
         }
         rig.drives[AXIS].stuck = Some(state);
-        for _ in 0..GROUP.cycles(GROUP.enable_timeout) {
-            rig.step(READY);
-        }
-        assert_eq!(rig.group.state(), Enabling, "{state}");
-        for (n, drive) in rig.drives.iter().enumerate() {
-            assert!(
-                n == AXIS || drive.state == others,
-                "{state}: axis {n} in {}",
-                drive.state
-            );
-        }
-        assert!(rig.until(FaultStop, 20) > 0);
+        rig.until(FaultStop, 300);
         let named = rig.events.iter().any(|e| {
-            let GroupEvent::Fault { axis, cause } = e else {
-                return false;
-            };
-            let FaultCause::NotEnabled(timeout) = cause else {
-                return false;
-            };
-            *axis == Some(AXIS as u8) && timeout.state == Some(state)
+            matches!(e, GroupEvent::Fault { axis: Some(3), cause: FaultCause::NotEnabled(timeout) }
+                if timeout.state == Some(state))
         });
-        assert!(named, "{state}: {:?}", rig.events);
-        assert!(rig.until(Faulted, 50) > 0);
+        assert!(named, "{state}: {}", rig.last());
+        rig.until(Faulted, 400);
         rig.step(READY);
         rig.step(READY);
-        assert!(
-            !rig.drives
-                .iter()
-                .any(|d| d.state == State::OperationEnabled)
-        );
+        let enabled = |d: &crate::plant::Drive| d.state == State::OperationEnabled;
+        assert!(!rig.drives.iter().any(enabled));
     }
+    let mut rig = Rig::standby(4);
+    rig.drives[AXIS].stuck = Some(State::OperationEnabled);
+    rig.order(Order::Disable);
+    rig.until(FaultStop, 300);
+    rig.until(Faulted, 400);
 }
 
-/// A blocked shaft is a following error with its size.
+/// The planner starves: the group notices that a path ended at speed, and stops.
 #[test]
-fn a_blocked_axis_stops_the_group() {
-    let mut rig = Rig::moving(6, 20);
-    rig.drives[AXIS].blocked = true;
-    assert!(rig.until(FaultStop, 100) > 0);
-    assert!(rig.events.iter().any(|e| matches!(
-        e,
-        GroupEvent::Fault {
-            axis: Some(3),
-            cause: FaultCause::FollowingError { allowed: 500, .. }
-        }
-    )));
-}
-
-/// Contract 1 and 5: a release is refused with the reason.
-#[test]
-fn a_release_is_refused_with_its_reason() {
-    let mut rig = Rig::standby(8);
-    rig.silent[AXIS] = true;
-    rig.step(RELEASE);
-    rig.silent[AXIS] = false;
-    rig.drives[AXIS].velocity = 20.0;
-    rig.step(RELEASE);
-    let refusals: Vec<_> = rig
-        .events
-        .iter()
-        .filter_map(|e| match e {
-            GroupEvent::ReleaseRefused(why) => Some(*why),
-            _ => None,
-        })
-        .collect();
-    assert_eq!(refusals[0], Refusal::NotFresh { axis: AXIS as u8 });
-    assert!(matches!(refusals[1], Refusal::NotAtRest { axis: 3, .. }));
-    assert_eq!(rig.group.state(), Standby);
-    assert!(rig.commands.iter().all(|c| c.velocity == 0));
-}
-
-/// A stop in motion: all references end in the same cycle, the axes rest
-/// together, and the next release runs the whole program from there.
-#[test]
-fn a_stop_is_coordinated_and_leads_to_standby() {
-    let mut rig = Rig::moving(9, FAST);
-    let before = rig.commands.map(|c| c.velocity.abs());
-    rig.step(STOP);
-    assert!(
-        rig.commands
-            .iter()
-            .zip(before)
-            .all(|(c, b)| c.velocity.abs() < b)
+fn a_path_that_runs_dry_is_a_fault() {
+    let mut rig = Rig::standby(1);
+    rig.released();
+    let start = rig.group.count() + 1;
+    rig.group.announce(start, 1).unwrap();
+    let at = rig.group.predict(0, 0).unwrap();
+    rig.group.push(
+        0,
+        canmaster::motion::path::Knot {
+            cycles: 50,
+            position: at.position + (500 << 32),
+            velocity: 20 << 32,
+        },
     );
-    assert!(rig.until(Standby, 200) > 0);
-    let stops = rig.observed.map(|o| o.stopped_ms);
-    let first = stops.iter().copied().fold(f64::MAX, f64::min);
-    let last = stops.iter().copied().fold(0.0, f64::max);
-    assert!(last - first < 10.0, "{stops:?}");
-    rig.release();
-    assert!(rig.until(Standby, 1500) > 0, "{:?}", rig.events);
+    rig.until(FaultStop, 60);
+    let cause = FaultCause::PathDry;
+    assert!(rig.events.contains(&GroupEvent::Fault {
+        axis: Some(0),
+        cause
+    }));
+    rig.until(Faulted, 100);
+}
+
+#[test]
+fn orders_are_refused_where_the_table_says() {
+    let mut rig = Rig::standby(1);
+    assert_eq!(rig.group.order(Order::Reset), Err(Refusal::NotIn(Standby)));
+    assert_eq!(rig.group.order(Order::Halt), Err(Refusal::NotIn(Standby)));
+    let home = Order::Home {
+        axes: ALL,
+        limit: 100,
+    };
+    let mode = Mode::ProfileVelocity;
+    assert_eq!(
+        rig.group.order(home),
+        Err(Refusal::WrongMode { axis: 0, mode })
+    );
+    rig.released();
+    let cyclic = Order::SetMode {
+        axes: ALL,
+        mode: Mode::CyclicPosition,
+    };
+    assert_eq!(rig.group.order(cyclic), Err(Refusal::NotIn(Moving)));
+}
+
+/// A drive that was switched off in motion may be enabled again before its axis
+/// stands: standby waits for that.
+#[test]
+fn standby_waits_until_the_axes_stand() {
+    let mut rig = Rig::new(1);
+    rig.drives[AXIS].velocity = 1500.0;
+    rig.until(Standby, 200);
+    assert!(rig.standing());
+    for _ in 0..20 {
+        rig.step(READY);
+    }
+    assert_eq!(rig.group.state(), Standby, "{}", rig.last());
 }

@@ -1,11 +1,13 @@
-//! The motion group against a plant: drives in profile velocity mode, each with
-//! its own lag, inertia, friction and noise. Virtual time, seeded.
+//! The group, its paths and programs, against simulated drives in every mode.
+//! Virtual time, seeded.
 
 mod absent;
 mod arrivals;
 mod contract;
+mod faults;
+mod modes;
+mod paths;
 mod plant;
-mod profile;
-mod program;
-mod property;
+mod programs;
 mod rig;
+mod table;

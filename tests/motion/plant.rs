@@ -1,8 +1,10 @@
-//! A drive in profile velocity mode with motor and load, no more than these
-//! tests need. Written from the drive's data sheet and CiA 402-2.
+//! A drive with motor and load in every mode, no more than these tests need.
+//! Written from the drive's data sheet and CiA 402-2.
 
 use canmaster::cia402::{Command, ControlWord, State};
-use canmaster::motion::{AxisCommand, AxisFeedback};
+use canmaster::motion::AxisCommand;
+use canmaster::motion::AxisFeedback;
+use canmaster::motion::mode::Mode;
 
 /// Steps of the drive's control loop per cycle of 10 ms.
 pub(crate) const STEPS: u32 = 25;
@@ -51,11 +53,24 @@ pub(crate) struct Drive {
     disturbance: f64,
     pub(crate) state: State,
     word: ControlWord,
+    /// As 6061h.
+    pub(crate) mode: Mode,
     target: AxisCommand,
     pending: AxisCommand,
     demand: f64,
     model: f64,
     integral: f64,
+    /// Where a cyclic position comes from, and how much of its cycle is over.
+    last: f64,
+    over: f64,
+    /// Where a move of the drive itself goes; `None`: there is none.
+    going: Option<f64>,
+    /// Bit 12 in modes that the drive leads.
+    answered: bool,
+    /// It never answers set-points, and does not find its home.
+    pub(crate) deaf: bool,
+    /// Homing ends with an error.
+    pub(crate) homeless: bool,
     pub(crate) position: f64,
     pub(crate) velocity: f64,
     /// The shaft does not turn, whatever the torque.
@@ -81,6 +96,13 @@ impl Drive {
             demand: 0.0,
             model: 0.0,
             integral: 0.0,
+            mode: Mode::ProfileVelocity,
+            last: 0.0,
+            over: 0.0,
+            going: None,
+            answered: false,
+            deaf: false,
+            homeless: false,
             velocity: 0.0,
             blocked: false,
             stuck: None,
@@ -95,16 +117,76 @@ impl Drive {
     /// SYNC: takes over the RPDOs and samples the TPDOs.
     pub(crate) fn sync(&mut self) -> AxisFeedback {
         // What the statusword says was true before the new controlword.
+        let leads = matches!(self.mode, Mode::ProfilePosition | Mode::Homing);
+        let there = self.velocity.abs() < 5.0 && self.going.is_none();
+        let failed = self.mode == Mode::Homing && self.homeless && self.word.0 & 1 << 4 != 0;
+        let bits = u16::from(there) << 10
+            | u16::from(leads && self.answered) << 12
+            | u16::from(failed) << 13;
         let feedback = AxisFeedback {
-            statusword: 0x0210 | self.state.bits(),
+            statusword: 0x0210 | bits | self.state.bits(),
             position: self.position.round() as i64 as i32,
             velocity: (self.velocity + self.random.between(-1.0, 1.0)).round() as i32,
             torque: 0,
             fresh: true,
         };
-        self.target = self.pending;
+        // Only the target of the mode that the drive is in is taken over.
+        let same = self.pending.mode.rpdo() == self.mode.rpdo();
+        self.last = self.aim();
+        self.over = 0.0;
+        self.target = AxisCommand {
+            target: if same {
+                self.pending.target
+            } else {
+                self.target.target
+            },
+            ..self.pending
+        };
+        let before = self.word;
         self.obey(ControlWord(self.target.controlword));
+        if leads {
+            self.lead(before);
+        }
         feedback
+    }
+
+    /// 6060h is written while the axis stands.
+    pub(crate) fn set_mode(&mut self, mode: Mode) {
+        self.mode = mode;
+        self.answered = false;
+        self.going = None;
+        self.target = self.pending;
+        self.last = f64::from(self.target.target);
+        self.over = 1.0;
+    }
+
+    /// Set-point handshake, and homing on the actual position (method 37).
+    fn lead(&mut self, before: ControlWord) {
+        const BEGIN: u16 = 1 << 4;
+        let begin = self.word.0 & BEGIN != 0;
+        if self.deaf || self.state != State::OperationEnabled {
+            return;
+        }
+        if self.mode == Mode::Homing {
+            if begin && before.0 & BEGIN == 0 && !self.homeless {
+                self.position = 0.0;
+            }
+            self.answered = begin && !self.homeless;
+        } else {
+            if begin && before.0 & BEGIN == 0 {
+                self.going = Some(f64::from(self.target.target));
+            }
+            self.answered = begin;
+        }
+        if self.word.halt() {
+            self.going = None;
+        }
+    }
+
+    /// Where a cyclic target is between two SYNCs.
+    fn aim(&self) -> f64 {
+        let to = f64::from(self.target.target);
+        self.last + (to - self.last) * self.over.min(1.0)
     }
 
     /// The drive's own error: the power stage goes off.
@@ -131,6 +213,8 @@ impl Drive {
             ReadyToSwitchOn if word.gives(SwitchOn) => SwitchedOn,
             SwitchedOn if word.gives(EnableOperation) => OperationEnabled,
             SwitchedOn | OperationEnabled if word.gives(Shutdown) => ReadyToSwitchOn,
+            OperationEnabled if word.gives(QuickStop) => QuickStopActive,
+            QuickStopActive if word.gives(DisableVoltage) => SwitchOnDisabled,
             OperationEnabled if word.gives(DisableOperation) => SwitchedOn,
             other => other,
         };
@@ -138,8 +222,12 @@ impl Drive {
 
     /// One control step.
     pub(crate) fn step(&mut self) {
+        let before = self.aim();
+        self.over += 1.0 / f64::from(STEPS);
         let torque = if self.state == State::OperationEnabled {
-            self.ramp();
+            self.demand(before)
+        } else if self.state == State::QuickStopActive {
+            self.ramp(0.0);
             self.control()
         } else {
             self.demand = self.velocity;
@@ -152,9 +240,35 @@ impl Drive {
         self.turn(torque + self.disturbance);
     }
 
+    /// The torque that the mode asks for.
+    fn demand(&mut self, before: f64) -> f64 {
+        let target = f64::from(self.target.target);
+        match self.mode {
+            Mode::ProfileVelocity => self.ramp(target),
+            Mode::CyclicVelocity => self.demand = self.aim(),
+            Mode::CyclicTorque => return target / 1000.0,
+            Mode::CyclicPosition => {
+                let aim = self.aim();
+                let feed = (aim - before) / STEP_S / PER_RPM;
+                self.demand = feed + 40.0 * (aim - self.position) / PER_RPM;
+            }
+            Mode::ProfilePosition | Mode::Homing => {
+                let left = self.going.map_or(0.0, |to| to - self.position);
+                let speed =
+                    (2.0 * left.abs() / PER_RPM * f64::from(self.target.deceleration) * 0.5)
+                        .sqrt()
+                        .min(500.0);
+                self.ramp(speed.copysign(left));
+                if left.abs() < 2.0 && self.velocity.abs() < 5.0 {
+                    self.going = None;
+                }
+            }
+        }
+        self.control()
+    }
+
     /// 6083h while the speed grows, 6084h while it shrinks.
-    fn ramp(&mut self) {
-        let wanted = f64::from(self.target.velocity);
+    fn ramp(&mut self, wanted: f64) {
         let slowing = self.demand * wanted < 0.0 || wanted.abs() < self.demand.abs();
         let slope = if slowing {
             self.target.deceleration

@@ -2,7 +2,9 @@
 
 use canmaster::cia402::State;
 use canmaster::motion::experiment::GROUP;
-use canmaster::motion::{AxisCommand, AxisFeedback, Group, GroupEvent, GroupState, Request};
+use canmaster::motion::mode::Mode;
+use canmaster::motion::{AxisCommand, Group, Inputs, Order};
+use canmaster::motion::{AxisFeedback, AxisMove, Director, GroupEvent, GroupState};
 
 use crate::plant::{Drive, STEPS};
 
@@ -27,6 +29,11 @@ pub(crate) struct Observed {
 
 pub(crate) struct Rig {
     pub(crate) group: Group<AXES>,
+    pub(crate) director: Director<AXES>,
+    pub(crate) program: Vec<u8>,
+    pub(crate) notices: Vec<GroupEvent>,
+    /// 6061h follows 6060h.
+    pub(crate) confirms: bool,
     pub(crate) drives: [Drive; AXES],
     pub(crate) feedback: [AxisFeedback; AXES],
     pub(crate) commands: [AxisCommand; AXES],
@@ -42,6 +49,10 @@ impl Rig {
         let drives = core::array::from_fn(|n| Drive::new(seed * 100 + n as u64));
         Rig {
             group: Group::new(&GROUP),
+            director: Director::new(&GROUP),
+            program: Vec::new(),
+            notices: Vec::new(),
+            confirms: true,
             drives,
             feedback: Default::default(),
             commands: Default::default(),
@@ -55,15 +66,32 @@ impl Rig {
     /// Enabled and in standby.
     pub(crate) fn standby(seed: u64) -> Rig {
         let mut rig = Rig::new(seed);
-        let left = rig.until(GroupState::Standby, 100);
-        assert!(left > 0, "{:?}", rig.events);
+        rig.until(GroupState::Standby, 100);
         rig
     }
 
-    /// Released; returns once the group moves.
+    /// In standby in another mode.
+    pub(crate) fn in_mode(seed: u64, mode: Mode) -> Rig {
+        let mut rig = Rig::standby(seed);
+        rig.order(Order::SetMode { axes: ALL, mode });
+        rig.step(READY);
+        rig.until(GroupState::Standby, 50);
+        assert!(rig.drives.iter().all(|drive| drive.mode == mode));
+        rig
+    }
+
+    /// Released, without anything to do.
+    pub(crate) fn released(&mut self) {
+        self.order(Order::Release);
+        self.step(READY);
+        assert_eq!(self.group.state(), GroupState::Moving);
+    }
+
+    /// Released and on a long move, fast after 100 cycles.
     pub(crate) fn moving(seed: u64, cycles: u32) -> Rig {
         let mut rig = Rig::standby(seed);
-        rig.release();
+        rig.released();
+        rig.go(|n| far(n));
         for _ in 0..cycles {
             rig.step(READY);
         }
@@ -71,33 +99,57 @@ impl Rig {
         rig
     }
 
-    pub(crate) fn release(&mut self) {
-        self.step(Request {
-            release: true,
-            ..READY
+    pub(crate) fn order(&mut self, order: Order) {
+        assert_eq!(self.group.order(order), Ok(()), "{}", self.last());
+    }
+
+    /// A move of all axes.
+    pub(crate) fn go(&mut self, part: impl Fn(usize) -> AxisMove) {
+        let parts = core::array::from_fn(|n| Some(part(n)));
+        assert_eq!(self.director.go(&self.group, &parts, false, 0), Ok(()));
+    }
+
+    /// Releases the program.
+    pub(crate) fn run(&mut self) {
+        assert_eq!(self.director.run(&mut self.group), Ok(()));
+    }
+
+    /// Steps until `state`, at most `cycles`.
+    pub(crate) fn until(&mut self, state: GroupState, cycles: u32) {
+        let came = (0..cycles).any(|_| {
+            self.step(READY);
+            self.group.state() == state
         });
+        assert!(came, "{state} is not reached: {}", self.last());
     }
 
-    /// Steps until `state`, at most `cycles`; returns how many were left.
-    pub(crate) fn until(&mut self, state: GroupState, cycles: u32) -> u32 {
-        (0..cycles)
-            .rev()
-            .find(|_| {
-                self.step(READY);
-                self.group.state() == state
-            })
-            .unwrap_or(0)
+    /// Steps until all have arrived.
+    pub(crate) fn arrive(&mut self, cycles: u32) {
+        self.step(READY);
+        let came = (0..cycles).any(|_| {
+            self.step(READY);
+            self.group.all_arrived()
+        });
+        assert!(came, "{}", self.last());
     }
 
-    /// One cycle: SYNC, TPDOs, group, RPDOs, and 10 ms of plant.
-    pub(crate) fn step(&mut self, request: Request) {
+    /// One cycle: SYNC, TPDOs, group, RPDOs, planning, and 10 ms of plant.
+    pub(crate) fn step(&mut self, inputs: Inputs) {
         for (n, drive) in self.drives.iter_mut().enumerate() {
             self.feedback[n] = drive.sync();
             self.feedback[n].fresh = !self.silent[n];
         }
-        self.group.step(request, &self.feedback, &mut self.commands);
+        self.group.step(&inputs, &self.feedback, &mut self.commands);
         while let Some(event) = self.group.take_event() {
             self.events.push(event);
+        }
+        self.director.round(&mut self.group, &self.program);
+        self.notices.extend(self.director.take_event());
+        if self.confirms
+            && let Some(wanted) = self.group.mode_wanted()
+        {
+            self.drives[wanted.axis].set_mode(wanted.mode);
+            self.group.confirm_mode(wanted);
         }
         for (drive, command) in self.drives.iter_mut().zip(&self.commands) {
             drive.receive(*command);
@@ -136,13 +188,41 @@ impl Rig {
     pub(crate) fn standing(&self) -> bool {
         self.drives.iter().all(|d| d.velocity.abs() < STOPPED_RPM)
     }
+
+    /// The end of what was told, for messages.
+    pub(crate) fn last(&self) -> String {
+        let from = self.events.len().saturating_sub(9);
+        let notices = self.notices.len().saturating_sub(4);
+        format!("{:?} {:?}", &self.events[from..], &self.notices[notices..])
+    }
+
+    /// The states that the group went through.
+    pub(crate) fn states(&self) -> Vec<GroupState> {
+        let entered = self.events.iter().filter_map(|event| match event {
+            GroupEvent::State { to, .. } => Some(*to),
+            _ => None,
+        });
+        entered.collect()
+    }
 }
 
-/// Nothing is asked and the network is up.
-pub(crate) const READY: Request = Request {
+/// Every axis.
+pub(crate) const ALL: u32 = (1 << AXES) - 1;
+
+/// A long move, another for each pair.
+pub(crate) fn far(n: usize) -> AxisMove {
+    AxisMove {
+        target: [80_000, -60_000, 80_000, -60_000, 120_000, 120_000][n],
+        velocity: [1200, 900, 1200, 900, 1500, 1500][n],
+        acceleration: [1500, 1000, 1500, 1000, 2000, 2000][n],
+        deceleration: [800, 600, 800, 600, 1000, 1000][n],
+        set: [1, 2, 1, 2, 3, 3][n],
+    }
+}
+
+/// The network is up, and nothing else.
+pub(crate) const READY: Inputs = Inputs {
     network_ready: true,
-    release: false,
-    stop: false,
-    fault: None,
     absent: 0,
+    fault: None,
 };

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::LazyLock;
 
 use canmaster::motion::experiment::{self, Motor};
-use canmaster::motion::{AxisMove, Step};
+use canmaster::motion::{AxisMove, Program, Step};
 use canmaster::network::sample::SIX_EPOS4;
 use canmaster::network::{ConfigWrite, Identity, Master, Network, Node, Pdo};
 use canmaster::pdo::{MappingEntry, Transmission};
@@ -60,9 +60,8 @@ pub fn sample() -> &'static Machine {
         network: &SIX_EPOS4,
         segments: vec![sample_segment()],
         motors: vec![Motor::SAMPLE; SIX_EPOS4.nodes.len()],
-        moves: moves(experiment::GROUP.program.steps),
-        round_trip: experiment::GROUP
-            .program
+        moves: moves(experiment::PROGRAM.steps),
+        round_trip: experiment::PROGRAM
             .duration(&experiment::GROUP)
             .ok()
             .map(Time::from),
@@ -175,8 +174,12 @@ fn program(motors: &[Motor], cycle: Duration) -> Option<Moves> {
     fn of<const N: usize>(motors: &[Motor], cycle: Duration) -> Option<Moves> {
         let motors: &[Motor; N] = motors.try_into().ok()?;
         let steps: &'static [Step<N>] = Box::leak(Box::new(experiment::steps(motors, cycle)));
-        let group = experiment::group(motors, cycle, u8::MAX, steps);
-        let duration = group.program.duration(&group).ok();
+        let group = experiment::group(motors, cycle, u8::MAX);
+        let program = Program {
+            name: "pairs, there and back",
+            steps,
+        };
+        let duration = program.duration(&group).ok();
         Some((moves(steps), duration.map(Time::from)))
     }
     // The number of axes is part of the type.

@@ -1,46 +1,35 @@
-//! Several axes as one group with one contract for faults.
+//! The group as it is stepped from SYNC to SYNC: it evaluates paths, supervises,
+//! and knows the contract. What paths there are is planned elsewhere.
 //!
-//! [`Group::step`] is called once per SYNC cycle, when the TPDOs of this SYNC are
-//! in or late; the commands it gives are taken over by the drives at the next
-//! SYNC.
-//!
-//! The contract:
-//! 1. The group moves only after a release, given in standby, when every axis is
-//!    enabled, fresh and at rest; the program starts from actual positions.
-//! 2. A fault of one axis stops all: the commands of the very step that detects
-//!    it carry the stop, which acts at the following SYNC. The axes that still
-//!    obey ramp down so that they come to rest together; an axis disabled by
-//!    its own drive is left out.
-//! 3. Recovery leads to standby, never to motion: a faulted group waits until
-//!    the network has gone down and come up again, or until the axis at fault is
-//!    left out.
-//! 4. What cannot be carried out is refused with a reason, and nothing is sent.
+//! [`Group::step`] is called once per cycle, when the TPDOs of this SYNC are in or
+//! late; what it commands is taken over by the drives at the next SYNC. Between
+//! two steps the group takes orders ([`Group::order`]) and paths
+//! ([`Group::announce`], [`Group::push`]).
 
 mod axis;
-mod config;
-mod event;
+mod drive_led;
+mod order;
 mod watch;
 
-pub use config::{AxisConfig, GroupConfig};
-pub use event::{FaultCause, GroupEvent, GroupState, Refusal};
+pub use drive_led::SetPoint;
+pub use order::Order;
 
+use self::axis::{Axis, stop_cycles};
+use super::contract::{Cell, Event, cell};
+use super::mode::Mode;
+use super::path::{Knot, Point};
+use super::{FaultCause, GroupConfig, GroupEvent, GroupState};
+use crate::cia402::{Command, Goal, State};
+use crate::time::Instant;
 use core::mem::MaybeUninit;
 use heapless::{Deque, Vec};
-
-use self::axis::Axis;
-use super::profile::whole_cycles;
-use super::program::{self, PlanError, Step};
-use super::{Profile, Ramp, Reference};
-use crate::cia402::Goal;
-use crate::time::Instant;
 
 /// Events kept until they are taken: enough for the busiest step, in which every
 /// one of six axes fails.
 const EVENTS: usize = 24;
-
-/// Where the count of cycles stands still: far behind the end of any reference,
-/// and far before the end of its type.
-const LONGEST_T: i32 = i32::MAX / 2;
+/// Cycles in which every drive has the target of a new mode before the mode is
+/// written.
+const TARGET_SETTLED: u32 = 3;
 
 /// What a drive reported in this cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -63,32 +52,63 @@ pub struct AxisFeedback {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct AxisCommand {
+    /// Which of the RPDOs is sent, and what the target is.
+    pub mode: Mode,
     /// 6040h.
     pub controlword: u16,
-    /// 60FFh, rpm.
-    pub velocity: i32,
+    /// 60FFh in the unit of 60A9h, 607Ah in increments, or 6071h in per mille.
+    pub target: i32,
     /// 6083h, rpm/s.
     pub acceleration: u32,
     /// 6084h, rpm/s.
     pub deceleration: u32,
 }
 
-/// What is asked of the group in one step.
+/// What the group is told in every step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Request {
+pub struct Inputs {
     /// Level: all mandatory nodes are checked, configured and operational.
     pub network_ready: bool,
-    /// Edge: run the program once.
-    pub release: bool,
-    /// Edge: ramp down to standby.
-    pub stop: bool,
-    /// Edge: a fault seen elsewhere, with the axis counted from 0.
-    pub fault: Option<(usize, FaultCause)>,
     /// Level: bit n leaves out axis n, whose optional node is not there. One that
     /// goes in motion is a fault; one that comes waits for standby.
     pub absent: u32,
+    /// Edge: a fault seen elsewhere, with the axis counted from 0.
+    pub fault: Option<(usize, FaultCause)>,
 }
+
+/// One axis, for whoever looks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AxisView {
+    /// As confirmed in 6061h.
+    pub mode: Mode,
+    /// As last heard since the group began to enable.
+    pub state: Option<State>,
+    /// What its drive reported in the last cycle.
+    pub feedback: AxisFeedback,
+    /// Where it should be, increments; in torque mode per mille.
+    pub reference: i32,
+    /// Where its path ends, as far as it is known.
+    pub end: i32,
+    /// Position from which targets count.
+    pub home: i32,
+    /// It is left out.
+    pub absent: bool,
+    /// A fault of it stopped the group.
+    pub faulted: bool,
+}
+
+/// An axis whose mode is to be written to 6060h and confirmed in 6061h.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ModeWanted {
+    /// Counted from 0.
+    pub axis: usize,
+    /// What to write.
+    pub mode: Mode,
+}
+
+/// The cycle at which a path was to begin has passed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TooLate;
 
 /// `N` axes moved in step; see the module.
 pub struct Group<const N: usize> {
@@ -97,20 +117,23 @@ pub struct Group<const N: usize> {
     axes: Vec<Axis, N>,
     state: GroupState,
     now: Instant,
-    /// Cycles since the references were set. They start at the SYNC after that,
-    /// so that at this step's SYNC they stand at `t - 1`.
-    t: i32,
+    /// Steps so far, and since the state was entered.
+    count: u32,
+    since: u32,
+    /// Somebody wants the axes enabled.
+    wanted: bool,
+    /// What was ordered since the last step.
+    ordered: Option<Order>,
+    /// A path that replaces what its axes follow: from which step on, and whose.
+    announced: Option<(u32, u32)>,
     /// Where all axes go together while enabling.
     stage: Goal,
-    step: usize,
-    /// Cycles of the ramp after a fault.
-    fault_ramp: u32,
     /// Since the fault, the network has gone down, or an axis at fault is left
     /// out.
     network_was_down: bool,
+    network_ready: bool,
     /// The axes left out since the group began to enable.
     absent: u32,
-    program: Result<(), PlanError>,
     events: Events,
 }
 
@@ -130,8 +153,8 @@ impl Events {
 }
 
 impl<const N: usize> Group<N> {
-    /// A group in [`GroupState::Idle`]. A program that breaks the limits is
-    /// reported when it is released.
+    /// A group in [`GroupState::Idle`] whose axes are enabled as soon as the
+    /// network is ready.
     pub fn new(config: &'static GroupConfig<N>) -> Group<N> {
         let mut group = Group::without_axes(config);
         group.add_axes();
@@ -155,19 +178,21 @@ impl<const N: usize> Group<N> {
         }
     }
 
-    fn without_axes(config: &'static GroupConfig<N>) -> Group<N> {
+    const fn without_axes(config: &'static GroupConfig<N>) -> Group<N> {
         Group {
             config,
             axes: Vec::new(),
             state: GroupState::Idle,
             now: Instant::ZERO,
-            t: 0,
+            count: 0,
+            since: 0,
+            wanted: true,
+            ordered: None,
+            announced: None,
             stage: Goal::Disabled,
-            step: 0,
-            fault_ramp: 0,
             network_was_down: false,
+            network_ready: false,
             absent: 0,
-            program: config.program.duration(config).map(|_| ()),
             events: Events {
                 queue: Deque::new(),
                 lost: 0,
@@ -180,6 +205,26 @@ impl<const N: usize> Group<N> {
         self.state
     }
 
+    /// Steps so far; wraps.
+    pub const fn count(&self) -> u32 {
+        self.count
+    }
+
+    /// One axis, counted from 0.
+    pub fn view(&self, axis: usize) -> Option<AxisView> {
+        let axis = self.axes.get(axis)?;
+        Some(AxisView {
+            mode: axis.mode,
+            state: axis.state(),
+            feedback: axis.feedback,
+            reference: super::fixed::round(axis.head().position),
+            end: super::fixed::round(axis.path.end()),
+            home: axis.home,
+            absent: axis.absent,
+            faulted: axis.faulted,
+        })
+    }
+
     /// The oldest event that was not taken yet. Take all after every step.
     pub fn take_event(&mut self) -> Option<GroupEvent> {
         self.events.queue.pop_front().or_else(|| {
@@ -188,77 +233,197 @@ impl<const N: usize> Group<N> {
         })
     }
 
+    /// Where the path of an axis will stand `cycles` steps from now: from there a
+    /// plan can go on.
+    pub fn predict(&self, axis: usize, cycles: u32) -> Option<Point> {
+        Some(self.axes.get(axis)?.path.ahead(cycles))
+    }
+
+    /// In the step number `start` the axes of `axes` go over to a path of which
+    /// the knots are pushed from now on. They count as moving from now on.
+    ///
+    /// # Errors
+    /// [`TooLate`] if that step was, or the group is not released.
+    pub fn announce(&mut self, start: u32, axes: u32) -> Result<(), TooLate> {
+        const FAR: u32 = 1 << 8;
+        let left = start.wrapping_sub(self.count);
+        if left == 0 || left > FAR || self.state != GroupState::Moving {
+            return Err(TooLate);
+        }
+        for axis in self.axes.iter_mut().filter(|axis| axis.is_in(axes)) {
+            axis.path.announce(left as usize);
+            axis.arrived = axis.absent;
+        }
+        self.announced = Some((start, axes));
+        Ok(())
+    }
+
+    /// Adds a knot to the path of an axis: to that announced, if one is.
+    pub fn push(&mut self, axis: usize, knot: Knot) {
+        let announced = self.announced.map_or(0, |(_, axes)| axes);
+        if let Some(axis) = self.axes.get_mut(axis) {
+            axis.path.push(knot, axis.is_in(announced));
+        }
+    }
+
+    /// Knots for which the path of an axis has room.
+    pub fn room(&self, axis: usize) -> usize {
+        self.axes.get(axis).map_or(0, |axis| axis.path.room())
+    }
+
+    /// The steepest slopes of what follows, rpm/s, for the ramps of the drive.
+    pub fn set_ramps(&mut self, axis: usize, up: f32, down: f32) {
+        let config = self.config;
+        if let Some(axis) = self.axes.get_mut(axis) {
+            axis.set_ramps(up, down, config);
+        }
+    }
+
+    /// A set-point of profile position mode, to be handed to the drive. `false`:
+    /// the drive has not taken the last one yet, or the group is not released, or
+    /// the axis is in another mode.
+    pub fn ask(&mut self, axis: usize, set_point: &SetPoint) -> bool {
+        let released = self.state == GroupState::Moving;
+        let Some(axis) = self.axes.get_mut(axis) else {
+            return false;
+        };
+        let can = released && axis.mode == Mode::ProfilePosition && axis.led.is_taken();
+        if can {
+            axis.led.ask(set_point);
+            axis.arrived = axis.absent;
+        }
+        can
+    }
+
+    /// Whether every axis has come to rest at the end of its path, and no other is
+    /// announced.
+    pub fn all_arrived(&self) -> bool {
+        self.announced.is_none() && self.axes.iter().all(|axis| axis.arrived)
+    }
+
+    /// Whether every path has reached its last knot, and no other is announced.
+    pub fn all_over(&self) -> bool {
+        self.announced.is_none() && self.axes.iter().all(|axis| axis.path.is_over())
+    }
+
+    /// The next axis whose mode has to be written and confirmed.
+    pub fn mode_wanted(&self) -> Option<ModeWanted> {
+        if self.state != GroupState::ModeChange || self.since < TARGET_SETTLED {
+            return None;
+        }
+        let wanted = |(axis, a): (usize, &Axis)| a.wanted.map(|mode| ModeWanted { axis, mode });
+        self.axes.iter().enumerate().find_map(wanted)
+    }
+
+    /// 6061h of an axis shows `mode`.
+    pub fn confirm_mode(&mut self, confirmed: ModeWanted) {
+        if let Some(axis) = self.axes.get_mut(confirmed.axis)
+            && axis.wanted == Some(confirmed.mode)
+        {
+            axis.mode = confirmed.mode;
+            axis.wanted = None;
+            axis.hold_actual();
+        }
+    }
+
     /// One cycle: takes in what the drives reported for this SYNC and fills in
     /// what to command for the next.
     pub fn step(
         &mut self,
-        request: Request,
+        inputs: &Inputs,
         feedback: &[AxisFeedback; N],
         out: &mut [AxisCommand; N],
     ) {
         self.now += self.config.cycle;
-        self.t = (self.t + 1).min(LONGEST_T);
+        self.count = self.count.wrapping_add(1);
+        self.since = self.since.saturating_add(1);
+        let mut cut = 0;
+        if let Some((start, axes)) = self.announced
+            && start == self.count
+        {
+            cut = axes;
+            self.announced = None;
+        }
         for (axis, feedback) in self.axes.iter_mut().zip(feedback) {
-            if let Some(state) = axis.hear(feedback) {
+            if let Some(state) = axis.hear(feedback, axis.is_in(cut)) {
                 let axis = axis.n;
                 self.events.report(GroupEvent::AxisState { axis, state });
             }
         }
-        self.watch(&request);
-        self.obey(&request);
+        self.watch(inputs);
+        self.obey(inputs);
         self.advance();
+        let (now, state) = (self.now, self.state);
+        let halt = matches!(state, GroupState::Stopping | GroupState::Halt);
         for (axis, out) in self.axes.iter_mut().zip(out) {
-            *out = match self.state {
-                _ if axis.absent => axis.command_off(),
-                GroupState::Idle | GroupState::Faulted => axis.command_off(),
-                GroupState::Enabling | GroupState::Standby => axis.command_rest(self.now),
-                GroupState::Moving | GroupState::Stopping => axis.command_follow(self.now, self.t),
-                GroupState::FaultStop => {
-                    let sent = u32::try_from(self.t).unwrap_or(0).saturating_add(1);
-                    let left = self.fault_ramp.saturating_sub(sent);
-                    axis.command_fault_stop(left, self.fault_ramp, self.config)
+            *out = match state {
+                _ if axis.absent => axis.command(Command::DisableVoltage),
+                GroupState::Idle | GroupState::Faulted => axis.command(Command::DisableVoltage),
+                GroupState::Enabling
+                | GroupState::Standby
+                | GroupState::ModeChange
+                | GroupState::Disabling => axis.rest(now),
+                GroupState::Moving
+                | GroupState::Stopping
+                | GroupState::Halt
+                | GroupState::Homing => axis.follow(now, false, halt),
+                // Quick stop leaves a drive that is braking by itself on its ramp
+                // and cannot enable anything.
+                GroupState::FaultStop if !axis.excluded && !axis.mode.is_led_by_drive() => {
+                    axis.follow(now, true, true)
                 }
+                GroupState::QuickStop | GroupState::FaultStop => axis.command(Command::QuickStop),
             };
         }
     }
 
+    /// What an event does, as the table has it. `false`: it is refused.
+    fn happen(&mut self, event: Event) -> bool {
+        match cell(self.state, event) {
+            Cell::Stay => {}
+            Cell::Refuse => return false,
+            Cell::Go(to) => self.enter(to),
+        }
+        true
+    }
+
+    #[inline(never)]
     fn enter(&mut self, to: GroupState) {
         let from = core::mem::replace(&mut self.state, to);
+        self.since = 0;
         self.events.report(GroupEvent::State { from, to });
-    }
-
-    /// Requests: network up, release, stop.
-    fn obey(&mut self, request: &Request) {
-        let ready = request.network_ready;
-        let left_out = |axis: &Axis| axis.faulted && axis.is_in(request.absent);
-        self.network_was_down |= !ready || self.axes.iter().any(left_out);
-        let enable = match self.state {
-            GroupState::Idle => ready,
-            GroupState::Faulted => ready && self.network_was_down,
-            GroupState::Standby => request.absent != self.absent,
-            GroupState::Moving if request.stop => {
-                self.begin_stopping();
-                false
+        self.announced = None;
+        match to {
+            GroupState::Enabling => {
+                for axis in &mut self.axes {
+                    axis.restart(self.absent);
+                }
+                self.set_stage(Goal::Disabled);
             }
-            _ => false,
-        };
-        if enable {
-            self.begin_enabling(request.absent);
-        }
-        if request.release
-            && let Err(refusal) = self.release(request.stop)
-        {
-            self.events.report(GroupEvent::ReleaseRefused(refusal));
+            GroupState::Disabling => self.set_stage(Goal::Disabled),
+            GroupState::Stopping | GroupState::Halt => self.stop(false),
+            GroupState::FaultStop => {
+                self.network_was_down = false;
+                for axis in &mut self.axes {
+                    axis.begin_fault_stop(from != GroupState::Enabling);
+                }
+                self.stop(true);
+            }
+            // At the end of a motion the axes are where they should be.
+            GroupState::Standby if from != GroupState::Moving => self.hold_actual(),
+            _ => {}
         }
     }
 
-    fn begin_enabling(&mut self, absent: u32) {
-        self.enter(GroupState::Enabling);
-        self.absent = absent;
-        for axis in &mut self.axes {
-            axis.restart(absent);
+    /// Ramps from the next SYNC on, equally long for all axes.
+    fn stop(&mut self, fault: bool) {
+        let mut cycles = 0;
+        for axis in &self.axes {
+            cycles = stop_cycles(axis.speed(fault), self.config).max(cycles);
         }
-        self.set_stage(Goal::Disabled);
+        for axis in &mut self.axes {
+            axis.stop(cycles, fault, self.config);
+        }
     }
 
     fn set_stage(&mut self, stage: Goal) {
@@ -268,188 +433,107 @@ impl<const N: usize> Group<N> {
         }
     }
 
-    fn release(&mut self, stop: bool) -> Result<(), Refusal> {
-        if self.state != GroupState::Standby {
-            return Err(Refusal::NotInStandby(self.state));
-        }
-        if stop {
-            return Err(Refusal::StopRequested);
-        }
-        for axis in &self.axes {
-            let AxisFeedback {
-                velocity, fresh, ..
-            } = axis.feedback;
-            let axis = match axis.absent {
-                true => continue,
-                false => axis.n,
-            };
-            if !fresh {
-                return Err(Refusal::NotFresh { axis });
-            }
-            if velocity.unsigned_abs() > self.config.standstill_rpm {
-                return Err(Refusal::NotAtRest { axis, velocity });
-            }
-        }
-        self.program.map_err(Refusal::Program)?;
-        self.hold_actual();
-        self.begin_step(0).map_err(Refusal::Program)?;
-        self.enter(GroupState::Moving);
-        self.events.report(GroupEvent::StepStarted { step: 0 });
-        Ok(())
-    }
-
-    /// References at rest where the axes are.
     fn hold_actual(&mut self) {
-        self.t = 0;
         for axis in &mut self.axes {
-            let position = if axis.feedback.fresh {
-                axis.feedback.position
-            } else {
-                axis.reference.end()
-            };
-            axis.follow(Reference::Hold(position), self.config);
+            axis.hold_actual();
         }
-    }
-
-    /// Sets the references for a step of the program, from where they end now.
-    /// Past the last step nothing changes.
-    fn begin_step(&mut self, step: usize) -> Result<(), PlanError> {
-        self.step = step;
-        match self.config.program.steps.get(step) {
-            None => {}
-            Some(Step::Dwell(_)) => {
-                for axis in &mut self.axes {
-                    axis.follow(Reference::Hold(axis.reference.end()), self.config);
-                }
-            }
-            Some(Step::Move(moves)) => {
-                let mut from = [0; N];
-                for (from, axis) in from.iter_mut().zip(&self.axes) {
-                    *from = axis.reference.end().wrapping_sub(axis.home);
-                }
-                let timings = program::plan(moves, &from, self.config)?;
-                for ((axis, part), timing) in self.axes.iter_mut().zip(moves).zip(timings) {
-                    let start = axis.reference.end();
-                    let reference = match part {
-                        None => Reference::Hold(start),
-                        Some(part) => {
-                            let target = axis.home.wrapping_add(part.target);
-                            Reference::Move(Profile::new(start, target, timing))
-                        }
-                    };
-                    axis.follow(reference, self.config);
-                }
-            }
-        }
-        self.t = 0;
-        Ok(())
-    }
-
-    /// Ramps from the set-points of the next SYNC, equally long for all axes.
-    fn begin_stopping(&mut self) {
-        let mut cycles = 0;
-        for axis in &self.axes {
-            let speed = axis.scale.rpm(axis.next(self.t).velocity);
-            cycles = self.stop_cycles(speed.abs() as u32).max(cycles);
-        }
-        for axis in &mut self.axes {
-            let ramp = Ramp::new(&axis.next(self.t), cycles);
-            axis.follow(Reference::Ramp(ramp), self.config);
-        }
-        self.t = 0;
-        self.enter(GroupState::Stopping);
-    }
-
-    /// Whole cycles to stop from a speed in rpm.
-    fn stop_cycles(&self, rpm: u32) -> u32 {
-        const SECOND_US: f32 = 1e6;
-        let per_cycle = self.config.stop_deceleration as f32
-            * (self.config.cycle.as_micros() as f32 / SECOND_US);
-        whole_cycles(rpm as f32 / per_cycle).unwrap_or(u32::MAX)
     }
 
     /// What goes on by itself in each state.
     fn advance(&mut self) {
-        match self.state {
-            GroupState::Idle | GroupState::Standby | GroupState::Faulted => {}
-            GroupState::Enabling => self.advance_enabling(),
-            GroupState::Moving => self.advance_program(),
-            GroupState::Stopping => self.advance_stopping(),
-            GroupState::FaultStop => self.advance_fault_stop(),
+        let done = match self.state {
+            GroupState::Idle | GroupState::Standby | GroupState::Faulted | GroupState::Halt => {
+                false
+            }
+            GroupState::Enabling | GroupState::Disabling => self.next_stage(),
+            GroupState::Moving | GroupState::Homing => {
+                let arrived = self.arrive(true);
+                arrived && self.state == GroupState::Homing
+            }
+            GroupState::Stopping => self.arrive(false),
+            GroupState::ModeChange => {
+                let change = self.axes.iter().find(|axis| axis.wanted.is_some());
+                match change.map(|axis| (axis.n, axis.wanted.unwrap_or_default())) {
+                    None => true,
+                    Some((axis, mode)) => {
+                        if self.since > self.config.cycles(self.config.enable_timeout) {
+                            let cause = FaultCause::ModeNotConfirmed { mode };
+                            self.fault(Some(axis), cause, Event::Late);
+                        }
+                        false
+                    }
+                }
+            }
+            GroupState::QuickStop | GroupState::FaultStop => self.comes_to_rest(),
+        };
+        if done {
+            self.happen(Event::Done);
         }
     }
 
     /// All axes reach a state before the next transition is commanded.
-    fn advance_enabling(&mut self) {
-        if !self.axes.iter().all(|a| a.absent || a.machine.reached()) {
-            return;
+    fn next_stage(&mut self) -> bool {
+        for axis in &mut self.axes {
+            // The target is the actual position until the drive follows it.
+            axis.hold_actual();
         }
-        match self.stage {
-            Goal::Disabled => self.set_stage(Goal::Ready),
-            Goal::Ready => self.set_stage(Goal::SwitchedOn),
-            Goal::SwitchedOn => self.set_stage(Goal::Enabled),
+        if !self.axes.iter().all(|a| a.absent || a.machine.reached()) {
+            return false;
+        }
+        let next = match self.stage {
+            _ if self.state == GroupState::Disabling => return true,
+            Goal::Disabled => Goal::Ready,
+            Goal::Ready => Goal::SwitchedOn,
+            Goal::SwitchedOn => Goal::Enabled,
             Goal::Enabled | Goal::QuickStop => {
                 // A drive that was switched off in motion may have been enabled
                 // before its axis stood: it brakes first.
                 let limit = self.config.standstill_rpm;
-                let rests =
-                    |a: &Axis| a.feedback.fresh && a.feedback.velocity.unsigned_abs() <= limit;
-                if self.axes.iter().all(|a| a.absent || rests(a)) {
-                    self.hold_actual();
-                    for axis in &mut self.axes {
-                        axis.home = axis.feedback.position;
-                    }
-                    self.enter(GroupState::Standby);
+                let rests = |axis: &Axis| {
+                    let AxisFeedback {
+                        fresh, velocity, ..
+                    } = axis.feedback;
+                    axis.absent || (fresh && velocity.unsigned_abs() <= limit)
+                };
+                let rest = self.axes.iter().all(rests);
+                for axis in self.axes.iter_mut().filter(|_| rest) {
+                    axis.home = axis.feedback.position;
                 }
+                return rest;
             }
-        }
-    }
-
-    fn advance_program(&mut self) {
-        let finished = match self.config.program.steps.get(self.step) {
-            None => true,
-            Some(Step::Dwell(time)) => {
-                u32::try_from(self.t).is_ok_and(|t| t >= self.config.cycles(*time))
-            }
-            Some(Step::Move(_)) => self.all_arrived(),
         };
-        // An arrival that failed has already begun the stop.
-        if !finished || self.state != GroupState::Moving {
-            return;
-        }
-        let next = self.step.saturating_add(1);
-        if next >= self.config.program.steps.len() {
-            self.enter(GroupState::Standby);
-            self.events.report(GroupEvent::ProgramDone);
-        } else if let Err(error) = self.begin_step(next) {
-            self.fault(None, FaultCause::Program(error));
-        } else {
-            self.events
-                .report(GroupEvent::StepStarted { step: next as u8 });
-        }
+        self.set_stage(next);
+        false
     }
 
-    /// Whether every axis has come to rest on its target.
-    fn all_arrived(&mut self) -> bool {
-        let mut all = true;
+    /// Whether every axis has come to rest, `on_target` or wherever it is.
+    fn arrive(&mut self, on_target: bool) -> bool {
+        let config = self.config;
+        let announced = self.announced.map_or(0, |(_, axes)| axes);
+        let mut all = announced == 0;
         for axis in &mut self.axes {
-            if axis.arrived || axis.absent {
+            if (axis.arrived && on_target) || axis.absent || axis.is_in(announced) {
                 continue;
             }
-            all = false;
-            match axis.comes_to_rest(self.t, true, self.config) {
-                Ok(None) => {}
+            match axis.comes_to_rest(on_target, config) {
+                Ok(None) => all = false,
                 Ok(Some(error)) => {
                     axis.arrived = true;
-                    self.events.report(GroupEvent::Arrived {
-                        axis: axis.n,
-                        target: axis.reference.end(),
-                        error,
-                    });
+                    if axis.mode == Mode::Homing && on_target {
+                        axis.home = 0;
+                    }
+                    if on_target {
+                        let (axis, target) = (axis.n, super::fixed::round(axis.head().position));
+                        self.events.report(GroupEvent::Arrived {
+                            axis,
+                            target,
+                            error,
+                        });
+                    }
                 }
                 Err(cause) => {
                     let axis = axis.n;
-                    self.fault(Some(axis), cause);
+                    self.fault(Some(axis), cause, Event::Late);
                     return false;
                 }
             }
@@ -457,24 +541,29 @@ impl<const N: usize> Group<N> {
         all
     }
 
-    fn advance_stopping(&mut self) {
-        let mut all = true;
+    /// After a quick stop or a fault: waits for standstill, for as long as an axis
+    /// may take. Axes that report nothing are not waited for.
+    fn comes_to_rest(&mut self) -> bool {
+        let config = self.config;
+        let patience = config.cycles(config.settle_timeout);
+        let (mut all, mut longest) = (true, 0);
         for axis in &mut self.axes {
-            if axis.absent {
-                continue;
-            }
-            match axis.comes_to_rest(self.t, false, self.config) {
-                Ok(rests) => all &= rests.is_some(),
-                Err(cause) => {
-                    let axis = axis.n;
-                    self.fault(Some(axis), cause);
-                    return;
+            let silent = axis.missing >= config.missing_tpdo_max;
+            let rests = axis.absent || (axis.path.is_over() && axis.settle(None, config));
+            all &= rests || silent;
+            longest = longest.max(stop_cycles(axis.config.velocity_max as f32, config));
+        }
+        if !all && self.since > patience.saturating_add(longest) {
+            for axis in &mut self.axes {
+                if !axis.absent && !axis.settle(None, config) {
+                    self.events.report(GroupEvent::NotAtRest {
+                        axis: axis.n,
+                        velocity: axis.feedback.velocity,
+                    });
                 }
             }
+            self.happen(Event::Late);
         }
-        if all {
-            self.hold_actual();
-            self.enter(GroupState::Standby);
-        }
+        all
     }
 }

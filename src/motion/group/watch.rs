@@ -1,28 +1,41 @@
-//! Supervision: what stops the group, and the stop after a fault.
+//! Supervision: what stops the group.
 
 use super::axis::Axis;
-use super::{FaultCause, Group, GroupEvent, GroupState, Request};
+use super::{Event, Group, Inputs};
 use crate::cia402::{Goal, StatusWord};
+use crate::motion::mode::Mode;
+use crate::motion::{FaultCause, GroupEvent, GroupState};
 
 impl<const N: usize> Group<N> {
-    /// Looks for faults in what was asked and reported in this step.
-    pub(super) fn watch(&mut self, request: &Request) {
-        if let Some((axis, cause)) = request.fault {
-            self.fault(u8::try_from(axis).ok(), cause);
+    /// Looks for faults in what was told and reported in this step.
+    pub(super) fn watch(&mut self, inputs: &Inputs) {
+        if let Some((axis, cause)) = inputs.fault {
+            self.fault(u8::try_from(axis).ok(), cause, Event::Fault);
         }
         let state = self.state;
         match state {
             GroupState::Idle | GroupState::Faulted => return,
             GroupState::FaultStop => {}
-            _ if !request.network_ready => self.fault(None, FaultCause::NetworkLost),
+            _ if !inputs.network_ready => {
+                self.fault(None, FaultCause::NetworkLost, Event::NotReady);
+            }
             _ => {}
         }
         for n in 0..self.axes.len() {
-            if let Some(axis) = self.axes.get(n)
-                && let Some(cause) = self.find_fault(axis, state, request)
+            if let Some(axis) = self.axes.get_mut(n)
+                && !axis.absent
             {
-                let axis = axis.n;
-                self.fault(Some(axis), cause);
+                let led = match state {
+                    GroupState::Moving | GroupState::Homing if axis.mode.is_led_by_drive() => {
+                        axis.led.hear(axis.mode, axis.fresh_status()).err()
+                    }
+                    _ => None,
+                };
+                let n = axis.n;
+                if let Some(cause) = led.or_else(|| self.find_fault(usize::from(n), state, inputs))
+                {
+                    self.fault(Some(n), cause, Event::Fault);
+                }
             }
         }
         if self.state == GroupState::FaultStop {
@@ -32,12 +45,10 @@ impl<const N: usize> Group<N> {
 
     /// A fault of an axis that was not reported yet, in the state that the
     /// group had at the beginning of the step.
-    fn find_fault(&self, axis: &Axis, state: GroupState, request: &Request) -> Option<FaultCause> {
+    fn find_fault(&self, n: usize, state: GroupState, inputs: &Inputs) -> Option<FaultCause> {
+        let axis: &Axis = self.axes.get(n)?;
         let feedback = &axis.feedback;
-        if axis.absent {
-            return None;
-        }
-        if request.network_ready && axis.is_in(request.absent) && !axis.faulted {
+        if inputs.network_ready && axis.is_in(inputs.absent) && !axis.faulted {
             return Some(FaultCause::LeftOperational);
         }
         if axis.missing >= self.config.missing_tpdo_max && !axis.faulted {
@@ -45,59 +56,55 @@ impl<const N: usize> Group<N> {
                 cycles: axis.missing,
             });
         }
-        if state == GroupState::Enabling
-            && let Err(timeout) = axis.machine.check(self.now)
-        {
+        let leads = matches!(state, GroupState::Enabling | GroupState::Disabling);
+        if leads && let Err(timeout) = axis.machine.check(self.now) {
             return Some(FaultCause::NotEnabled(timeout));
         }
         if !feedback.fresh || (state == GroupState::FaultStop && axis.excluded) {
             return None;
         }
         let status = StatusWord(feedback.statusword);
-        if state == GroupState::Enabling {
-            // The first stage of enabling resets the faults of the past.
-            let reset = self.stage == Goal::Disabled;
-            return (status.state().is_fault() && !reset)
-                .then_some(FaultCause::DriveFault { status });
-        }
         if status.state().is_fault() {
-            return Some(FaultCause::DriveFault { status });
+            // The first stage of enabling resets the faults of the past.
+            let reset = leads && self.stage == Goal::Disabled;
+            return (!reset).then_some(FaultCause::DriveFault { status });
         }
-        if !status.state().is_enabled() {
+        if leads || state == GroupState::QuickStop {
+            return None;
+        }
+        let braking = state == GroupState::FaultStop && axis.mode.is_led_by_drive();
+        if !status.state().is_enabled() && !braking {
             return Some(FaultCause::LeftEnabled { status });
         }
-        let allowed = axis.config.following_error_max;
-        let error = axis.error(self.t);
-        (self.state != GroupState::FaultStop && error.unsigned_abs() > allowed)
-            .then_some(FaultCause::FollowingError { error, allowed })
+        if self.state == GroupState::FaultStop {
+            return None;
+        }
+        if axis.wanted.is_some() {
+            return None;
+        }
+        let reports = matches!(axis.mode, Mode::CyclicPosition | Mode::ProfilePosition);
+        if reports && status.mode_bit_13() {
+            return Some(FaultCause::DriveError { status });
+        }
+        if axis.mode.has_position() {
+            let (allowed, error) = (axis.config.following_error_max, axis.error());
+            if error.unsigned_abs() > allowed {
+                return Some(FaultCause::FollowingError { error, allowed });
+            }
+        }
+        axis.path.is_dry().then_some(FaultCause::PathDry)
     }
 
     /// Reports a fault and, if the group is not stopped for one yet, stops it.
     /// Before the axes are to be enabled a fault is only reported.
     #[inline(never)]
-    pub(super) fn fault(&mut self, axis: Option<u8>, cause: FaultCause) {
+    pub(super) fn fault(&mut self, axis: Option<u8>, cause: FaultCause, event: Event) {
         self.events.report(GroupEvent::Fault { axis, cause });
         if let Some(axis) = axis.and_then(|n| self.axes.get_mut(usize::from(n))) {
             axis.faulted = true;
         }
-        match self.state {
-            GroupState::Idle | GroupState::Faulted | GroupState::FaultStop => {}
-            _ => self.begin_fault_stop(),
-        }
-    }
-
-    fn begin_fault_stop(&mut self) {
-        self.network_was_down = false;
-        self.t = 0;
-        let enabled = self.state != GroupState::Enabling;
-        self.enter(GroupState::FaultStop);
-        self.fault_ramp = 0;
-        for axis in &mut self.axes {
-            axis.begin_fault_stop(enabled);
-        }
-        for axis in &self.axes {
-            let cycles = self.stop_cycles(axis.speed_before_fault());
-            self.fault_ramp = self.fault_ramp.max(cycles);
+        if self.state != GroupState::FaultStop {
+            self.happen(event);
         }
     }
 
@@ -111,33 +118,6 @@ impl<const N: usize> Group<N> {
                 let axis = axis.n;
                 self.events.report(GroupEvent::Coasting { axis, state });
             }
-        }
-    }
-
-    /// Waits for standstill, then disables. Axes that report nothing are not
-    /// waited for.
-    pub(super) fn advance_fault_stop(&mut self) {
-        let group = self.config;
-        let t = u32::try_from(self.t).unwrap_or(0);
-        if t < self.fault_ramp {
-            return;
-        }
-        let patience = group.cycles(group.settle_timeout);
-        let late = t >= self.fault_ramp.saturating_add(patience);
-        let mut all = true;
-        for axis in &mut self.axes {
-            let silent = axis.missing >= group.missing_tpdo_max;
-            let rests = axis.absent || axis.settle(None, group);
-            all &= rests || silent;
-            if late && !rests {
-                self.events.report(GroupEvent::NotAtRest {
-                    axis: axis.n,
-                    velocity: axis.feedback.velocity,
-                });
-            }
-        }
-        if all || late {
-            self.enter(GroupState::Faulted);
         }
     }
 }

@@ -5,6 +5,7 @@ use anyhow::{Context, Result, bail, ensure};
 use canmaster::id::{Address, FunctionCode, NodeId};
 use canmaster::master::AxisPdos;
 use canmaster::motion::AxisCommand;
+use canmaster::motion::mode::Mode;
 use canmaster::network::sample::SIX_EPOS4;
 use canmaster::network::{self, Identity, Master, Network, Node, Pdo};
 use canmaster::nmt::{Command, NodeControl, Target};
@@ -72,7 +73,8 @@ impl Random {
         const VELOCITY_MAX: i64 = 100_000;
         AxisCommand {
             controlword: self.next() as u16 & !ENABLE_OPERATION,
-            velocity: (self.next() as i64 % (VELOCITY_MAX + 1)) as i32,
+            mode: Mode::ProfileVelocity,
+            target: (self.next() as i64 % (VELOCITY_MAX + 1)) as i32,
             acceleration: self.next() as u32 | 1,
             deceleration: self.next() as u32 | 1,
         }
@@ -88,7 +90,7 @@ fn parameters(command: &AxisCommand) -> [(Address, Vec<u8>); 4] {
         ),
         (
             objects::TARGET_VELOCITY,
-            command.velocity.to_le_bytes().into(),
+            command.target.to_le_bytes().into(),
         ),
         (
             objects::PROFILE_ACCELERATION,

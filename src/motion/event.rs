@@ -1,6 +1,8 @@
 //! What a group reports, with the facts for a log.
 
 use crate::cia402::{State, StatusWord, Timeout};
+use crate::motion::director::format::ProgramError;
+use crate::motion::mode::Mode;
 use crate::motion::program::PlanError;
 use crate::words::in_words;
 
@@ -17,11 +19,39 @@ pub enum GroupState {
     Moving,
     /// All axes ramp together to standstill, enabled; standby follows.
     Stopping,
+    /// As stopping, but the motion waits there for another release.
+    Halt,
+    /// The drives search for their homes.
+    Homing,
+    /// Axes change their modes of operation, at standstill.
+    ModeChange,
+    /// Each drive brakes on its quick stop ramp; the axes are disabled then.
+    QuickStop,
+    /// The axes are led to switch on disabled.
+    Disabling,
     /// After a fault: the axes that still obey ramp together to standstill.
     FaultStop,
     /// At standstill and disabled after a fault. Only a restart of the network
     /// leads out.
     Faulted,
+}
+
+impl GroupState {
+    /// All of them, in the order of the table of the contract.
+    pub const ALL: [GroupState; 12] = [
+        GroupState::Idle,
+        GroupState::Enabling,
+        GroupState::Standby,
+        GroupState::Moving,
+        GroupState::Stopping,
+        GroupState::Halt,
+        GroupState::Homing,
+        GroupState::ModeChange,
+        GroupState::QuickStop,
+        GroupState::Disabling,
+        GroupState::FaultStop,
+        GroupState::Faulted,
+    ];
 }
 
 in_words!(GroupState {
@@ -30,6 +60,11 @@ in_words!(GroupState {
     GroupState::Standby => ("standby"),
     GroupState::Moving => ("moving"),
     GroupState::Stopping => ("stopping"),
+    GroupState::Halt => ("halted"),
+    GroupState::Homing => ("homing"),
+    GroupState::ModeChange => ("changing modes"),
+    GroupState::QuickStop => ("quick stop"),
+    GroupState::Disabling => ("disabling"),
     GroupState::FaultStop => ("stopping after a fault"),
     GroupState::Faulted => ("faulted"),
 });
@@ -81,6 +116,25 @@ pub enum FaultCause {
     LeftOperational,
     /// The network as a whole is no longer ready.
     NetworkLost,
+    /// The drive reports a following error or, searching for home, that it
+    /// failed: bit 13 of the statusword.
+    DriveError {
+        /// As received.
+        status: StatusWord,
+    },
+    /// The drive did not acknowledge a set-point, or did not find its home, in
+    /// time.
+    NotDone {
+        /// In which mode.
+        mode: Mode,
+    },
+    /// 6061h did not show the mode of operation that was written in time.
+    ModeNotConfirmed {
+        /// The mode.
+        mode: Mode,
+    },
+    /// The planning did not keep up with the motion.
+    PathDry,
 }
 
 in_words!(FaultCause {
@@ -107,6 +161,14 @@ in_words!(FaultCause {
     FaultCause::HeartbeatLost => ("heartbeat lost: check the cable and the drive's supply"),
     FaultCause::Emergency { code } => ("emergency {:#06x}", code),
     FaultCause::LeftOperational => ("the node left NMT operational"),
+    FaultCause::DriveError { status } => (
+        "the drive reports a following or homing error (statusword {:#06x})", status.0
+    ),
+    FaultCause::NotDone { mode } => ("not done in time in mode \"{}\"", mode),
+    FaultCause::ModeNotConfirmed { mode } => (
+        "mode \"{}\" was not confirmed in 6061h", mode
+    ),
+    FaultCause::PathDry => ("no set-points in time: the processor is overloaded"),
     FaultCause::NetworkLost => ("the network is no longer complete"),
 });
 
@@ -132,6 +194,28 @@ pub enum Refusal {
     },
     /// The program breaks a limit.
     Program(PlanError),
+    /// The order does not count in this state of the group.
+    NotIn(GroupState),
+    /// The network is not ready.
+    NetworkNotReady,
+    /// The axis is in another mode of operation.
+    WrongMode {
+        /// Counted from 0.
+        axis: u8,
+        /// Its mode.
+        mode: Mode,
+    },
+    /// The drive does not have the mode.
+    ModeNotSupported {
+        /// Counted from 0.
+        axis: u8,
+        /// What was asked for.
+        mode: Mode,
+        /// What it has, as 6502h.
+        supported: u32,
+    },
+    /// The last command is not carried out yet.
+    Busy,
 }
 
 in_words!(Refusal {
@@ -142,6 +226,14 @@ in_words!(Refusal {
         "axis {}: still turning at {} rpm", axis + 1, velocity
     ),
     Refusal::Program(error) => ("{}", error),
+    Refusal::NotIn(state) => ("not while the group is {}", state),
+    Refusal::NetworkNotReady => ("the network is not ready"),
+    Refusal::WrongMode { axis, mode } => ("axis {}: it is in mode \"{}\"", axis + 1, mode),
+    Refusal::ModeNotSupported { axis, mode, supported } => (
+        "axis {}: the drive does not have mode \"{}\", only those of 6502h = {:#x}",
+        axis + 1, mode, supported
+    ),
+    Refusal::Busy => ("the last command is not carried out yet"),
 });
 
 /// Something that happened in a step, for the log. Axes are counted from 0 and
@@ -181,6 +273,10 @@ pub enum GroupEvent {
     },
     /// The program ran through; the group is in standby again.
     ProgramDone,
+    /// The program cannot go on; the group stops.
+    ProgramFailed(ProgramError),
+    /// A move cannot be made; what was commanded before goes on.
+    MoveRefused(PlanError),
     /// A fault stops the group, or came on top of one.
     Fault {
         /// Counted from 0; `None` where no single axis is the cause.
@@ -220,6 +316,8 @@ in_words!(GroupEvent {
         "axis {}: arrived at {}, error {}", axis + 1, target, error
     ),
     GroupEvent::ProgramDone => ("program done"),
+    GroupEvent::ProgramFailed(error) => ("program stopped: {}", error),
+    GroupEvent::MoveRefused(error) => ("move refused: {}", error),
     GroupEvent::Fault { axis: Some(axis), cause } => ("axis {}: {}", axis + 1, cause),
     GroupEvent::Fault { axis: None, cause } => ("{}", cause),
     GroupEvent::Coasting { axis, state } => (

@@ -1,7 +1,8 @@
 //! What a group is told about its axes, all in constants.
 
+use crate::motion::mode::Mode;
 use crate::motion::position_control::Tuning;
-use crate::motion::program::Program;
+use crate::motion::program::{Limit, PlanError};
 use crate::motion::scale::Scale;
 use crate::time::Duration;
 
@@ -15,25 +16,49 @@ pub struct AxisConfig {
     pub velocity_max: u32,
     /// Highest acceleration and deceleration of a move, rpm/s.
     pub acceleration_max: u32,
-    /// Farthest target from home, increments.
-    pub travel_max: u32,
+    /// Farthest targets from home, increments: the lower, the upper.
+    pub travel: (i32, i32),
     /// Position error that stops the group, increments.
     pub following_error_max: u32,
     /// Position error within which an axis has arrived, increments.
     pub in_position: u32,
     /// The position loop.
     pub tuning: Tuning,
+    /// Modes of operation that the drive has, as 6502h.
+    pub modes: u32,
+    /// The mode that it is configured for.
+    pub mode: Mode,
+    /// Highest torque that is ever commanded, per mille of the rated one.
+    pub torque_max: u16,
 }
 
-/// A group of `N` axes and the program that a release runs.
+impl AxisConfig {
+    /// Whether a target, counted from home, lies within the travel.
+    ///
+    /// # Errors
+    /// With the end that is passed.
+    pub(in crate::motion) fn reaches(&self, axis: u8, target: i32) -> Result<(), PlanError> {
+        let (lower, upper) = self.travel;
+        let end = if target < 0 { lower } else { upper };
+        if target.unsigned_abs() > end.unsigned_abs() {
+            return Err(PlanError::OutOfLimits {
+                axis,
+                limit: Limit::Target,
+                value: target,
+                allowed: end.unsigned_abs(),
+            });
+        }
+        Ok(())
+    }
+}
+
+/// A group of `N` axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GroupConfig<const N: usize> {
     /// Time between two SYNCs, which is the time between two steps.
     pub cycle: Duration,
     /// The axes, in the order of feedback and commands.
     pub axes: [AxisConfig; N],
-    /// What one release runs.
-    pub program: Program<N>,
     /// Time for all axes to reach the next state on the way to operation
     /// enabled.
     pub enable_timeout: Duration,

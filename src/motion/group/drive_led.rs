@@ -1,0 +1,149 @@
+//! Motion that the drive makes by itself: the set-point handshake of profile
+//! position mode (CiA 402-2, 10.3) and homing (11.3).
+
+use crate::cia402::{ControlWord, StatusWord};
+use crate::motion::FaultCause;
+use crate::motion::mode::Mode;
+
+/// Bit 4 of the controlword: new set-point, or begin homing.
+const BEGIN: u16 = 1 << 4;
+/// Bit 5: the set-point replaces the running one; else it comes after it.
+const IMMEDIATELY: u16 = 1 << 5;
+/// Bit 6: the set-point counts from the last one.
+const RELATIVE: u16 = 1 << 6;
+
+/// Fresh TPDOs until the statusword shows what came of a controlword: that of the
+/// SYNC at which the drive takes it over was sampled before.
+const SEEN_AFTER: u8 = 2;
+
+/// How a set-point is meant.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SetPoint {
+    /// 607Ah, increments.
+    pub target: i32,
+    /// It replaces the running one at once; else the drive finishes that first.
+    pub immediately: bool,
+    /// It counts from the set-point before.
+    pub relative: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    /// Nothing is to be done.
+    Done,
+    /// To be asked of the drive as soon as it can take it.
+    Asked,
+    /// Bit 4 is set; so many fresh TPDOs since.
+    Set(u8),
+    /// The drive took it; bit 4 is low again.
+    Taken,
+    /// The drive moves.
+    Running,
+}
+
+/// What one axis has asked of its drive.
+pub(super) struct DriveLed {
+    phase: Phase,
+    /// Cycles since it was asked, or since the drive took the set-point.
+    waited: u32,
+    /// Cycles in which homing has to end.
+    limit: u32,
+    /// 607Ah.
+    pub(super) target: i32,
+    flags: u16,
+}
+
+impl DriveLed {
+    pub(super) const fn new() -> DriveLed {
+        DriveLed {
+            phase: Phase::Done,
+            waited: 0,
+            limit: u32::MAX,
+            target: 0,
+            flags: 0,
+        }
+    }
+
+    /// Whether the drive took the last set-point: another may follow.
+    pub(super) fn is_taken(&self) -> bool {
+        matches!(self.phase, Phase::Done | Phase::Running)
+    }
+
+    /// A new set-point.
+    pub(super) fn ask(&mut self, set_point: &SetPoint) {
+        self.phase = Phase::Asked;
+        self.waited = 0;
+        self.target = set_point.target;
+        self.flags = if set_point.immediately {
+            IMMEDIATELY
+        } else {
+            0
+        } | if set_point.relative { RELATIVE } else { 0 };
+    }
+
+    /// Homing, to end within `limit` cycles.
+    pub(super) fn home(&mut self, limit: u32) {
+        self.ask(&SetPoint::default());
+        self.limit = limit;
+    }
+
+    /// Bits 4 to 6 and 8 of the controlword.
+    pub(super) fn bits(&self, halt: bool) -> u16 {
+        let begun = match self.phase {
+            Phase::Set(_) => BEGIN | self.flags,
+            _ => 0,
+        };
+        ControlWord(begun).with_halt(halt).0
+    }
+
+    /// Takes in a fresh statusword.
+    pub(super) fn hear(
+        &mut self,
+        mode: Mode,
+        status: Option<StatusWord>,
+    ) -> Result<(), FaultCause> {
+        self.waited = self.waited.saturating_add(1);
+        let Some(status) = status else {
+            return Ok(());
+        };
+        if mode == Mode::ProfilePosition {
+            self.phase = match (self.phase, status.mode_bit_12()) {
+                (Phase::Asked, false) => Phase::Set(0),
+                (Phase::Set(_), true) => Phase::Taken,
+                (Phase::Taken, false) => {
+                    self.waited = 0;
+                    Phase::Running
+                }
+                (Phase::Running, false) if status.target_reached() => Phase::Done,
+                (phase, _) => phase,
+            };
+            return Ok(());
+        }
+        self.phase = match self.phase {
+            Phase::Asked => Phase::Set(0),
+            Phase::Set(seen) if seen < SEEN_AFTER => Phase::Set(seen + 1),
+            Phase::Set(_) if status.mode_bit_13() => {
+                return Err(FaultCause::DriveError { status });
+            }
+            Phase::Set(_) if status.mode_bit_12() && status.target_reached() => Phase::Done,
+            phase => phase,
+        };
+        Ok(())
+    }
+
+    /// Whether it is done; an error if a handshake takes more than `limit` cycles,
+    /// or homing longer than it may.
+    pub(super) fn outcome(&self, mode: Mode, limit: u32) -> Result<Option<i32>, FaultCause> {
+        let limit = match (mode, self.phase) {
+            (_, Phase::Done) => return Ok(Some(0)),
+            (Mode::Homing, _) => self.limit,
+            // The drive moves as long as it needs.
+            (_, Phase::Running) => u32::MAX,
+            _ => limit,
+        };
+        if self.waited > limit {
+            return Err(FaultCause::NotDone { mode });
+        }
+        Ok(None)
+    }
+}

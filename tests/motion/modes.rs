@@ -1,0 +1,248 @@
+//! Changes of mode, profile position, homing, torque.
+
+use canmaster::cia402::ControlWord;
+use canmaster::motion::mode::Mode;
+use canmaster::motion::{AxisMove, FaultCause, GroupEvent, GroupState};
+use canmaster::motion::{Order, SetPoint};
+
+use crate::rig::{ALL, AXES, READY, Rig, far};
+
+use GroupState::*;
+
+#[test]
+fn every_mode_from_every_mode() {
+    let mut rig = Rig::standby(1);
+    for from in Mode::ALL {
+        for to in Mode::ALL {
+            for mode in [from, to] {
+                rig.order(Order::SetMode { axes: ALL, mode });
+                rig.step(READY);
+                for _ in 0..50 {
+                    rig.step(READY);
+                }
+                assert_eq!(rig.group.state(), Standby, "{from} to {to}: {}", rig.last());
+            }
+            let places = rig.drives.each_ref().map(|drive| drive.position);
+            for _ in 0..30 {
+                rig.step(READY);
+                assert_eq!(rig.group.state(), Standby, "{from} to {to}: {}", rig.last());
+            }
+            for (n, place) in places.into_iter().enumerate() {
+                assert!(
+                    (rig.drives[n].position - place).abs() < 3.0,
+                    "{from} to {to}"
+                );
+                assert_eq!(rig.commands[n].mode, to);
+            }
+        }
+    }
+}
+
+/// The RPDO of the new mode, with the actual position, goes out before the mode is
+/// written.
+#[test]
+fn the_target_is_there_before_the_mode() {
+    let mut rig = Rig::standby(2);
+    rig.confirms = false;
+    rig.order(Order::SetMode {
+        axes: 0b10,
+        mode: Mode::CyclicPosition,
+    });
+    rig.step(READY);
+    assert_eq!(rig.group.state(), ModeChange);
+    assert_eq!(rig.group.mode_wanted(), None);
+    let mut cycles = 0;
+    while rig.group.mode_wanted().is_none() {
+        let command = rig.commands[1];
+        assert_eq!(command.mode, Mode::CyclicPosition);
+        assert_eq!(command.target, rig.feedback[1].position);
+        assert!(!ControlWord(command.controlword).halt());
+        rig.step(READY);
+        cycles += 1;
+    }
+    assert!(cycles >= 2);
+    assert_eq!(rig.group.mode_wanted().unwrap().axis, 1);
+}
+
+#[test]
+fn a_mode_that_is_not_confirmed_is_a_fault_that_names_it() {
+    let mut rig = Rig::standby(2);
+    rig.confirms = false;
+    let mode = Mode::CyclicTorque;
+    rig.order(Order::SetMode { axes: 0b100, mode });
+    rig.until(FaultStop, 300);
+    let cause = FaultCause::ModeNotConfirmed { mode };
+    assert!(rig.events.contains(&GroupEvent::Fault {
+        axis: Some(2),
+        cause
+    }));
+    rig.until(Faulted, 400);
+}
+
+#[test]
+fn profile_position_by_handshake() {
+    let mut rig = Rig::in_mode(3, Mode::ProfilePosition);
+    let homes: [i32; AXES] = core::array::from_fn(|n| rig.group.view(n).unwrap().home);
+    rig.released();
+    for sign in [1, -1] {
+        rig.go(|n| AxisMove {
+            target: sign * far(n).target / 10,
+            ..far(n)
+        });
+        let mut raised = false;
+        for _ in 0..10 {
+            rig.step(READY);
+            raised |= rig.commands[0].controlword & 1 << 4 != 0;
+        }
+        assert!(raised);
+        assert_eq!(rig.commands[0].controlword & 1 << 4, 0, "lowered again");
+        rig.arrive(2000);
+        for (n, home) in homes.into_iter().enumerate() {
+            let target = f64::from(home + sign * far(n).target / 10);
+            assert!((rig.drives[n].position - target).abs() < 5.0, "axis {n}");
+        }
+    }
+}
+
+#[test]
+fn a_set_point_replaces_the_running_one() {
+    let mut rig = Rig::in_mode(3, Mode::ProfilePosition);
+    let home = rig.group.view(0).unwrap().home;
+    rig.released();
+    let to = |way: i32| SetPoint {
+        target: home + way,
+        immediately: true,
+        relative: false,
+    };
+    assert!(rig.group.ask(0, &to(60_000)));
+    assert!(
+        !rig.group.ask(0, &to(0)),
+        "the drive has not taken the first yet"
+    );
+    for _ in 0..50 {
+        rig.step(READY);
+    }
+    assert!(rig.group.ask(0, &to(1000)));
+    rig.arrive(2000);
+    assert!((rig.drives[0].position - f64::from(home + 1000)).abs() < 5.0);
+}
+
+/// Halt in profile position; after a fault quick stop.
+#[test]
+fn what_the_drive_leads_is_halted() {
+    for fault in [false, true] {
+        let mut rig = Rig::in_mode(3, Mode::ProfilePosition);
+        rig.released();
+        rig.go(far);
+        for _ in 0..60 {
+            rig.step(READY);
+        }
+        assert!(!rig.standing());
+        if fault {
+            rig.drives[0].fail();
+            rig.until(Faulted, 500);
+        } else {
+            rig.order(Order::Stop);
+            rig.step(READY);
+            assert!(ControlWord(rig.commands[0].controlword).halt());
+            rig.until(Standby, 500);
+        }
+        assert!(rig.standing());
+    }
+}
+
+#[test]
+fn a_deaf_drive_is_named_in_time() {
+    let mut rig = Rig::in_mode(3, Mode::ProfilePosition);
+    rig.released();
+    rig.drives[4].deaf = true;
+    rig.go(far);
+    rig.until(FaultStop, 300);
+    let mode = Mode::ProfilePosition;
+    let cause = FaultCause::NotDone { mode };
+    assert!(rig.events.contains(&GroupEvent::Fault {
+        axis: Some(4),
+        cause
+    }));
+    rig.until(Faulted, 500);
+}
+
+#[test]
+fn homing_ends_in_standby_and_targets_count_from_there() {
+    let mut rig = Rig::in_mode(5, Mode::Homing);
+    rig.order(Order::Home {
+        axes: ALL,
+        limit: 500,
+    });
+    rig.step(READY);
+    assert_eq!(rig.group.state(), Homing);
+    rig.until(Standby, 50);
+    assert!(rig.drives.iter().all(|drive| drive.position.abs() < 2.0));
+    for n in 0..AXES {
+        assert_eq!(rig.group.view(n).unwrap().home, 0);
+    }
+    rig.order(Order::SetMode {
+        axes: ALL,
+        mode: Mode::CyclicPosition,
+    });
+    rig.step(READY);
+    rig.until(Standby, 50);
+    rig.released();
+    rig.go(far);
+    rig.arrive(2000);
+    assert!((rig.drives[0].position - 80_000.0).abs() < 5.0);
+}
+
+#[test]
+fn homing_that_fails_or_takes_too_long_is_a_fault() {
+    for (homeless, limit) in [(true, 500), (false, 30)] {
+        let mut rig = Rig::in_mode(5, Mode::Homing);
+        rig.drives[1].homeless = homeless;
+        rig.drives[1].deaf = !homeless;
+        rig.order(Order::Home { axes: ALL, limit });
+        rig.until(FaultStop, 100);
+        let named = rig.events.iter().any(|event| match event {
+            GroupEvent::Fault {
+                axis: Some(1),
+                cause,
+            } => match cause {
+                FaultCause::DriveError { status } => homeless && status.mode_bit_13(),
+                FaultCause::NotDone { mode } => !homeless && *mode == Mode::Homing,
+                _ => false,
+            },
+            _ => false,
+        });
+        assert!(named, "{}", rig.last());
+        rig.until(Faulted, 500);
+    }
+}
+
+#[test]
+fn a_torque_is_ramped_and_stops() {
+    let mut rig = Rig::in_mode(5, Mode::CyclicTorque);
+    rig.released();
+    rig.go(|n| AxisMove {
+        target: 60 + 5 * n as i32,
+        velocity: 1000,
+        acceleration: 4000,
+        deceleration: 4000,
+        set: 0,
+    });
+    let mut last = [0; AXES];
+    for _ in 0..60 {
+        rig.step(READY);
+        for (command, last) in rig.commands.iter().zip(&mut last) {
+            // 1000 per mille a second.
+            let more = command.target - *last;
+            assert!((0..=11).contains(&more), "{more} from {last}");
+            *last = command.target;
+        }
+    }
+    assert_eq!(last, [60, 65, 70, 75, 80, 85]);
+    rig.order(Order::Stop);
+    rig.step(READY);
+    for _ in 0..200 {
+        rig.step(READY);
+    }
+    assert!(rig.commands.iter().all(|command| command.target == 0));
+}
