@@ -24,11 +24,21 @@ const END: usize = 500;
 
 /// One step and what the group was told in it.
 struct Step {
-    request: Request,
+    inputs: Inputs,
+    order: Option<Order>,
     feedback: [AxisFeedback; AXES],
     /// The state before it.
     state: GroupState,
 }
+
+/// A move that lasts.
+const FAR: AxisMove = AxisMove {
+    target: 1_000_000,
+    velocity: 1500,
+    acceleration: 2000,
+    deceleration: 2000,
+    set: 0,
+};
 
 /// Statuswords of CiA 402 with remote.
 const DISABLED: u16 = 0x0250;
@@ -56,48 +66,76 @@ fn obey(drive: &mut AxisFeedback, command: &AxisCommand, awake: bool) {
 
 /// From the start through all states to the fault.
 fn recorded() -> Vec<Step> {
-    let mut group = Group::new(&GROUP);
+    let mut run = Run::new();
     let mut feedback = [AxisFeedback::default(); AXES];
-    let mut commands = [AxisCommand::default(); AXES];
     let mut steps = Vec::new();
     for at in 0..END {
-        for (drive, command) in feedback.iter_mut().zip(&commands) {
+        for (drive, command) in feedback.iter_mut().zip(&run.commands) {
             obey(drive, command, at >= ASLEEP);
         }
-        let request = Request {
-            network_ready: at >= NETWORK_UP,
-            release: at == RELEASED || at == RELEASED_AGAIN,
-            stop: at == STOPPED,
-            fault: (at == FAULT).then_some((0, FaultCause::HeartbeatLost)),
-            absent: 0,
-        };
         steps.push(Step {
-            request,
+            inputs: Inputs {
+                network_ready: at >= NETWORK_UP,
+                fault: (at == FAULT).then_some((0, FaultCause::HeartbeatLost)),
+                absent: 0,
+            },
+            order: match at {
+                RELEASED | RELEASED_AGAIN => Some(Order::Release),
+                STOPPED => Some(Order::Stop),
+                _ => None,
+            },
             feedback,
-            state: group.state(),
+            state: run.group.state(),
         });
-        step(&mut group, steps.last(), &mut commands);
+        run.step(steps.last());
     }
     steps
 }
 
-fn step(group: &mut Group<AXES>, step: Option<&Step>, commands: &mut [AxisCommand; AXES]) {
-    if let Some(step) = step {
-        group.step(step.request, &step.feedback, commands);
+/// The group, and who plans for it.
+struct Run {
+    group: Group<AXES>,
+    director: Director<AXES>,
+    commands: [AxisCommand; AXES],
+}
+
+impl Run {
+    fn new() -> Run {
+        Run {
+            group: Group::new(&GROUP),
+            director: Director::new(&GROUP),
+            commands: [AxisCommand::default(); AXES],
+        }
     }
-    while group.take_event().is_some() {}
+
+    /// A released group gets something to do at once.
+    fn step(&mut self, step: Option<&Step>) {
+        let Some(step) = step else { return };
+        if let Some(order) = step.order {
+            // What is refused shows in the state.
+            let _ = self.group.order(order);
+        }
+        self.group
+            .step(&step.inputs, &step.feedback, &mut self.commands);
+        while self.group.take_event().is_some() {}
+        let released = step.order == Some(Order::Release);
+        if released && self.group.state() == GroupState::Moving {
+            let parts = [Some(FAR); AXES];
+            let _ = self.director.go(&self.group, &parts, false, 0);
+            self.director.round(&mut self.group, &[]);
+        }
+    }
 }
 
 /// Leads a group to step `from` and then `times` farther.
 fn from(steps: &[Step], from: usize, times: u32) {
-    let mut group = Group::new(&GROUP);
-    let mut commands = [AxisCommand::default(); AXES];
+    let mut run = Run::new();
     for n in 0..from {
-        step(&mut group, steps.get(n), &mut commands);
+        run.step(steps.get(n));
     }
     for n in from..from + times as usize {
-        step(&mut group, steps.get(n), &mut commands);
-        black_box(&commands);
+        run.step(steps.get(n));
+        black_box(&run.commands);
     }
 }
 

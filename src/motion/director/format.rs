@@ -11,6 +11,8 @@ use crate::words::in_words;
 pub const VERSION: u8 = 1;
 /// Bytes before the steps.
 const HEADER: usize = 4;
+/// Bytes behind them.
+const CRC: usize = 2;
 /// How deep loops may be.
 pub const LOOPS: usize = 4;
 /// A move counts from where the axes are.
@@ -190,7 +192,6 @@ impl<'a> Reader<'a> {
 /// # Errors
 /// What is wrong with it as a whole.
 pub fn steps(bytes: &[u8], axes: usize) -> Result<&[u8], ProgramFault> {
-    const CRC: usize = 2;
     let mut reader = Reader(bytes);
     let header = (reader.number(1), reader.number(1), reader.number(2));
     let (Some(version), Some(made_for), Some(length)) = header else {
@@ -211,6 +212,12 @@ pub fn steps(bytes: &[u8], axes: usize) -> Result<&[u8], ProgramFault> {
         return Err(ProgramFault::Checksum);
     }
     Ok(steps)
+}
+
+/// The steps of a program that was checked before.
+pub(super) fn body(bytes: &[u8]) -> &[u8] {
+    let end = bytes.len().saturating_sub(CRC);
+    bytes.get(HEADER..end).unwrap_or_default()
 }
 
 /// The first step of `bytes`, and how many bytes it has.

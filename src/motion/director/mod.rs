@@ -170,10 +170,10 @@ impl<const N: usize> Director<N> {
     }
 
     /// Looks how far the group is, and goes on with the steps of the program:
-    /// `program` are its bytes. Whether there is something to plan.
+    /// `program` are its bytes, as [`format::check`] took them; while it runs it has
+    /// to stay the same. Whether there is something to plan.
     pub fn look(&mut self, group: &mut Group<N>, program: &[u8]) -> bool {
-        // A program that another has replaced ends here.
-        let steps = format::steps(program, N).unwrap_or_default();
+        let steps = format::body(program);
         match (self.phase, group.state()) {
             (Phase::Idle, _) => {}
             (Phase::Released, GroupState::Moving) => {

@@ -121,8 +121,9 @@ impl Axis {
             self.settled = 0;
             self.over = 0;
         }
-        self.points.rotate_left(1);
-        self.points[AHEAD] = self.path.advance();
+        let head = self.path.advance();
+        let [now, next, ahead, beyond] = &mut self.points;
+        (*now, *next, *ahead, *beyond) = (*next, *ahead, *beyond, head);
         self.over = if self.path.is_over() {
             self.over.saturating_add(1)
         } else {
@@ -214,6 +215,7 @@ impl Axis {
     pub(super) fn stop<const N: usize>(
         &mut self,
         cycles: u32,
+        speed: f32,
         fault: bool,
         group: &GroupConfig<N>,
     ) {
@@ -225,7 +227,6 @@ impl Axis {
             ..Knot::default()
         };
         if self.mode.has_position() {
-            let speed = self.speed(fault);
             if fault {
                 from.velocity = fixed::fixed(self.scale.velocity(speed));
             }
@@ -239,9 +240,9 @@ impl Axis {
         }
         self.path.restart(&from);
         self.path.push(end, false);
-        for point in self.points.iter_mut().skip(2) {
-            *point = self.path.advance();
-        }
+        let [.., ahead, beyond] = &mut self.points;
+        *ahead = self.path.advance();
+        *beyond = self.path.advance();
     }
 
     /// Begins the stop after a fault. Axes that their drives do not hold enabled

@@ -417,12 +417,15 @@ impl<const N: usize> Group<N> {
 
     /// Ramps from the next SYNC on, equally long for all axes.
     fn stop(&mut self, fault: bool) {
-        let mut cycles = 0;
-        for axis in &self.axes {
-            cycles = stop_cycles(axis.speed(fault), self.config).max(cycles);
+        let mut speeds = [0.0; N];
+        let mut fastest = 0.0f32;
+        for (speed, axis) in speeds.iter_mut().zip(&self.axes) {
+            *speed = axis.speed(fault);
+            fastest = fastest.max(speed.abs());
         }
-        for axis in &mut self.axes {
-            axis.stop(cycles, fault, self.config);
+        let cycles = stop_cycles(fastest, self.config);
+        for (speed, axis) in speeds.into_iter().zip(&mut self.axes) {
+            axis.stop(cycles, speed, fault, self.config);
         }
     }
 
@@ -546,14 +549,14 @@ impl<const N: usize> Group<N> {
     fn comes_to_rest(&mut self) -> bool {
         let config = self.config;
         let patience = config.cycles(config.settle_timeout);
-        let (mut all, mut longest) = (true, 0);
+        let (mut all, mut fastest) = (true, 0);
         for axis in &mut self.axes {
             let silent = axis.missing >= config.missing_tpdo_max;
             let rests = axis.absent || (axis.path.is_over() && axis.settle(None, config));
             all &= rests || silent;
-            longest = longest.max(stop_cycles(axis.config.velocity_max as f32, config));
+            fastest = fastest.max(axis.config.velocity_max);
         }
-        if !all && self.since > patience.saturating_add(longest) {
+        if !all && self.since > patience.saturating_add(stop_cycles(fastest as f32, config)) {
             for axis in &mut self.axes {
                 if !axis.absent && !axis.settle(None, config) {
                     self.events.report(GroupEvent::NotAtRest {
