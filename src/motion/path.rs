@@ -192,6 +192,24 @@ impl Path {
         self.cursor = Cursor::at(at);
     }
 
+    /// To rest in so many cycles, by one ramp from `at` on; `share` is one of them.
+    /// The cheapest of pieces: it is made between a SYNC and the next.
+    pub(super) fn brake(&mut self, at: &Point, cycles: u32, share: f32) {
+        self.restart(at);
+        if cycles > 0 {
+            let cursor = &mut self.cursor;
+            let steep = fixed::fine(-fixed::float(at.velocity) * share);
+            cursor.second = steep;
+            cursor.first = at.velocity + (steep >> (MORE + 1));
+            let way = (at.velocity >> 1).wrapping_mul(i64::from(cycles));
+            cursor.to = Knot {
+                cycles,
+                position: at.position.wrapping_add(way),
+                velocity: 0,
+            };
+        }
+    }
+
     /// Whether the last knot is reached.
     pub fn is_over(&self) -> bool {
         self.cursor.to.cycles == 0 && self.queue.len() <= self.next

@@ -3,6 +3,7 @@
 
 mod absent;
 mod arrivals;
+mod built_in;
 mod contract;
 mod faults;
 mod modes;

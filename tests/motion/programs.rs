@@ -297,7 +297,7 @@ fn what_is_wrong_is_named() {
     let whole = |fault| ProgramError { step: 0, fault };
     let at = |step, fault| ProgramError { step, fault };
 
-    let bytes = program(&[good.clone()]);
+    let bytes = program(std::slice::from_ref(&good));
     let mut version = bytes.clone();
     version[0] = 2;
     assert_eq!(fault(&version), whole(ProgramFault::Version(2)));

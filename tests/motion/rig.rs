@@ -91,7 +91,7 @@ impl Rig {
     pub(crate) fn moving(seed: u64, cycles: u32) -> Rig {
         let mut rig = Rig::standby(seed);
         rig.released();
-        rig.go(|n| far(n));
+        rig.go(far);
         for _ in 0..cycles {
             rig.step(READY);
         }

@@ -148,10 +148,9 @@ impl<const N: usize> Director<N> {
             return Err(Refusal::Busy);
         }
         for (axis, part) in parts.iter().enumerate() {
-            let leg = match part {
-                Some(part) => Some(self.leg(group, axis, part, relative, jerk)),
-                None => None,
-            };
+            let leg = part
+                .as_ref()
+                .map(|part| self.leg(group, axis, part, relative, jerk));
             if let Some(place) = self.legs.get_mut(axis) {
                 *place = leg.transpose().map_err(Refusal::Program)?;
             }
@@ -219,10 +218,8 @@ impl<const N: usize> Director<N> {
                     };
                 }
             }
-            Phase::Waiting(until) => {
-                if group.count().wrapping_sub(until) as i32 >= 0 {
-                    self.phase = Phase::Next;
-                }
+            Phase::Waiting(until) if group.count().wrapping_sub(until) as i32 >= 0 => {
+                self.phase = Phase::Next;
             }
             Phase::Finishing(_) if group.all_arrived() => {
                 // Refused only while another order waits.
@@ -245,11 +242,11 @@ impl<const N: usize> Director<N> {
                 Err(_) => self.phase = Phase::Idle,
             },
             // The release of the program counts until its end.
-            Phase::Ordered(count) if count != group.count() => {
-                if group.order(Order::Release).is_ok() {
-                    self.at = self.next;
-                    self.phase = Phase::Released;
-                }
+            Phase::Ordered(count)
+                if count != group.count() && group.order(Order::Release).is_ok() =>
+            {
+                self.at = self.next;
+                self.phase = Phase::Released;
             }
             _ => {}
         }

@@ -121,10 +121,14 @@ impl Axis {
             self.settled = 0;
             self.over = 0;
         }
-        let head = self.path.advance();
-        let [now, next, ahead, beyond] = &mut self.points;
-        (*now, *next, *ahead, *beyond) = (*next, *ahead, *beyond, head);
-        self.over = if self.path.is_over() {
+        let over = self.path.is_over();
+        // At rest all points are the same.
+        if !(over && self.ended()) {
+            let head = self.path.advance();
+            let [now, next, ahead, beyond] = &mut self.points;
+            (*now, *next, *ahead, *beyond) = (*next, *ahead, *beyond, head);
+        }
+        self.over = if over && self.path.is_over() {
             self.over.saturating_add(1)
         } else {
             0
@@ -211,10 +215,12 @@ impl Axis {
         }
     }
 
-    /// Replaces the path by a ramp of so many cycles from the next SYNC on.
+    /// Replaces the path by a ramp of so many cycles from the next SYNC on; `share`
+    /// is one of them.
     pub(super) fn stop<const N: usize>(
         &mut self,
         cycles: u32,
+        share: f32,
         speed: f32,
         fault: bool,
         group: &GroupConfig<N>,
@@ -222,24 +228,24 @@ impl Axis {
         self.settled = 0;
         self.over = 0;
         let [_, mut from, ..] = self.points;
-        let mut end = Knot {
-            cycles,
-            ..Knot::default()
-        };
+        if cycles == 0 {
+            from.velocity = 0;
+        }
         if self.mode.has_position() {
             if fault {
                 from.velocity = fixed::fixed(self.scale.velocity(speed));
             }
-            let way = (from.velocity >> 1).wrapping_mul(i64::from(cycles));
-            end.position = from.position.wrapping_add(way);
-            let slope = self.scale.cycles(speed.abs() / cycles.max(1) as f32);
+            let slope = self.scale.cycles(speed.abs() * share);
             self.set_ramps(slope, slope, group);
+            self.path.brake(&from, cycles, share);
+        } else {
+            self.path.restart(&from);
+            let end = Knot {
+                cycles,
+                ..Knot::default()
+            };
+            self.path.push(end, false);
         }
-        if cycles == 0 {
-            from.velocity = 0;
-        }
-        self.path.restart(&from);
-        self.path.push(end, false);
         let [.., ahead, beyond] = &mut self.points;
         *ahead = self.path.advance();
         *beyond = self.path.advance();
@@ -257,7 +263,7 @@ impl Axis {
 
     /// Whether the path is over and the SYNC just passed lies behind its end.
     pub(super) fn ended(&self) -> bool {
-        self.over > AHEAD as u32
+        self.over >= AHEAD as u32
     }
 
     /// Whether it has come to rest since its path ended, `on_target` or wherever

@@ -424,8 +424,9 @@ impl<const N: usize> Group<N> {
             fastest = fastest.max(speed.abs());
         }
         let cycles = stop_cycles(fastest, self.config);
+        let share = 1.0 / cycles.max(1) as f32;
         for (speed, axis) in speeds.into_iter().zip(&mut self.axes) {
-            axis.stop(cycles, speed, fault, self.config);
+            axis.stop(cycles, share, speed, fault, self.config);
         }
     }
 
