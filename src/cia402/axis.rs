@@ -94,8 +94,8 @@ enum Reset {
     Idle,
     /// The last controlword returned had bit 7 low, for the edge.
     Low,
-    /// Bit 7 is high since then.
-    High(Instant),
+    /// Bit 7 is high.
+    High,
 }
 
 /// The commanding side for one drive: follows the statusword and says which
@@ -107,23 +107,30 @@ enum Reset {
 pub struct Axis {
     goal: Goal,
     since: Instant,
-    timeout: Duration,
-    state: Option<State>,
+    status: Option<StatusWord>,
     word: ControlWord,
     reset: Reset,
+    /// When bit 7 was set.
+    set_at: Instant,
+}
+
+impl Default for Axis {
+    fn default() -> Axis {
+        Axis::new()
+    }
 }
 
 impl Axis {
     /// An axis of which nothing is known; sends disable voltage until told
-    /// otherwise. `timeout` bounds the way to every goal.
-    pub const fn new(timeout: Duration) -> Axis {
+    /// otherwise.
+    pub const fn new() -> Axis {
         Axis {
             goal: Goal::Disabled,
             since: Instant::ZERO,
-            timeout,
-            state: None,
+            status: None,
             word: ControlWord::new(Command::DisableVoltage),
             reset: Reset::Idle,
+            set_at: Instant::ZERO,
         }
     }
 
@@ -131,7 +138,7 @@ impl Axis {
     pub const fn set_goal(&mut self, goal: Goal, now: Instant) {
         self.goal = goal;
         self.since = now;
-        self.state = None;
+        self.status = None;
     }
 
     /// The goal as set.
@@ -141,12 +148,15 @@ impl Axis {
 
     /// The last state heard since the goal was set.
     pub const fn state(&self) -> Option<State> {
-        self.state
+        match self.status {
+            Some(status) => Some(status.state()),
+            None => None,
+        }
     }
 
     /// Whether a fresh statusword has shown that the goal is reached.
     pub fn reached(&self) -> bool {
-        self.state.is_some_and(|s| self.goal.reached_by(s))
+        self.state().is_some_and(|s| self.goal.reached_by(s))
     }
 
     /// One cycle: takes in the statusword, if a fresh one came, and returns the
@@ -156,9 +166,8 @@ impl Axis {
         let Some(status) = fresh else {
             return self.word;
         };
-        let state = status.state();
-        self.state = Some(state);
-        match self.goal.command_from(state) {
+        self.status = fresh;
+        match self.goal.command_from(status.state()) {
             None => {}
             Some(Command::FaultReset) => self.reset_fault(now),
             Some(command) => {
@@ -169,32 +178,29 @@ impl Axis {
         self.word
     }
 
-    /// The goal was not reached within the time allowed.
+    /// The goal was not reached within `timeout`.
     ///
     /// # Errors
     /// [`Timeout`] with the state that the drive stayed in.
-    pub fn check(&self, now: Instant) -> Result<(), Timeout> {
-        if self.reached() || now.since(self.since) <= self.timeout {
+    pub fn check(&self, now: Instant, timeout: Duration) -> Result<(), Timeout> {
+        if now.since(self.since) <= timeout || self.reached() {
             return Ok(());
         }
         Err(Timeout {
-            state: self.state,
+            state: self.state(),
             goal: self.goal,
         })
     }
 
     /// A clean edge: bit 7 low in at least one controlword, then high.
     fn reset_fault(&mut self, now: Instant) {
-        match self.reset {
-            Reset::High(since) if now.since(since) < RESET_RETRY => {}
-            Reset::Low => {
-                self.word = ControlWord::new(Command::FaultReset);
-                self.reset = Reset::High(now);
-            }
-            Reset::Idle | Reset::High(_) => {
-                self.word = ControlWord::new(Command::DisableVoltage);
-                self.reset = Reset::Low;
-            }
-        }
+        let (command, reset) = match self.reset {
+            Reset::High if now.since(self.set_at) < RESET_RETRY => return,
+            Reset::Low => (Command::FaultReset, Reset::High),
+            Reset::Idle | Reset::High => (Command::DisableVoltage, Reset::Low),
+        };
+        self.word = ControlWord::new(command);
+        self.reset = reset;
+        self.set_at = now;
     }
 }

@@ -101,6 +101,22 @@ impl StatusWord {
         }
     }
 
+    /// Whether the state is operation enabled.
+    pub const fn is_enabled(self) -> bool {
+        self.0 & MASK_STATE == State::OperationEnabled.bits()
+    }
+
+    /// Whether the state is a fault, or the reaction to one.
+    pub const fn is_fault(self) -> bool {
+        let bits = self.0 & MASK_WITHOUT_QUICK_STOP;
+        bits == State::Fault.bits() || bits == State::FaultReactionActive.bits()
+    }
+
+    /// Whether the bits that make the state are the same in `other`.
+    pub const fn shows_as(self, other: StatusWord) -> bool {
+        (self.0 ^ other.0) & MASK_STATE == 0
+    }
+
     const fn bit(self, n: u16) -> bool {
         self.0 & (1 << n) != 0
     }

@@ -68,7 +68,7 @@ fn command_coding() {
 
 #[test]
 fn enabling_waits_for_each_state() {
-    let mut axis = Axis::new(TIMEOUT);
+    let mut axis = Axis::new();
     axis.set_goal(Goal::Enabled, ms(0));
     let chart = [
         (0x0000, 0x0000), // not ready: wait
@@ -83,12 +83,12 @@ fn enabling_waits_for_each_state() {
         assert_eq!(axis.step(ms(1), Some(StatusWord(status))).0, control);
     }
     assert!(axis.reached());
-    assert_eq!(axis.check(ms(10_000)), Ok(()));
+    assert_eq!(axis.check(ms(10_000), TIMEOUT), Ok(()));
 }
 
 #[test]
 fn a_stale_statusword_is_not_judged() {
-    let mut axis = Axis::new(TIMEOUT);
+    let mut axis = Axis::new();
     axis.set_goal(Goal::Ready, ms(0));
     axis.step(ms(0), Some(StatusWord(0x0231)));
     assert!(axis.reached());
@@ -96,18 +96,18 @@ fn a_stale_statusword_is_not_judged() {
     assert_eq!(axis.state(), None);
     // Nothing heard: the word stays, and the timeout says that nothing was heard.
     assert_eq!(axis.step(ms(20), None).0, 0x0006);
-    let timeout = axis.check(ms(511)).unwrap_err();
+    let timeout = axis.check(ms(511), TIMEOUT).unwrap_err();
     assert_eq!(timeout.state, None);
     assert_eq!(timeout.goal, Goal::Enabled);
 }
 
 #[test]
 fn a_timeout_names_the_state() {
-    let mut axis = Axis::new(TIMEOUT);
+    let mut axis = Axis::new();
     axis.set_goal(Goal::SwitchedOn, ms(0));
     axis.step(ms(400), Some(StatusWord(0x0231)));
-    assert_eq!(axis.check(ms(500)), Ok(()));
-    let timeout = axis.check(ms(501)).unwrap_err();
+    assert_eq!(axis.check(ms(500), TIMEOUT), Ok(()));
+    let timeout = axis.check(ms(501), TIMEOUT).unwrap_err();
     assert_eq!(
         std::format!("{timeout}"),
         "stayed in \"ready to switch on\" instead of \"switched on\""
@@ -118,7 +118,7 @@ fn a_timeout_names_the_state() {
 /// new edge if the fault stays.
 #[test]
 fn fault_reset_is_a_clean_edge() {
-    let mut axis = Axis::new(TIMEOUT);
+    let mut axis = Axis::new();
     axis.step(ms(0), Some(StatusWord(0x0237)));
     axis.set_goal(Goal::Ready, ms(0));
     let fault = Some(StatusWord(0x0208));
@@ -157,7 +157,7 @@ fn every_goal_from_every_state() {
                 state: start,
                 word: ControlWord(0),
             };
-            let mut axis = Axis::new(TIMEOUT);
+            let mut axis = Axis::new();
             axis.set_goal(goal, ms(0));
             for cycle in 0..12 {
                 let word = axis.step(ms(cycle), Some(StatusWord(drive.state.bits())));

@@ -119,7 +119,7 @@ mod app {
     /// Sets up the board and hands each task its part. Runs with interrupts off,
     /// before anything can be late.
     #[init(local = [
-        group_place: MaybeUninit<Group<AXES>> = MaybeUninit::uninit(),
+        group: Group<AXES> = Group::ZERO,
         director_place: MaybeUninit<Director<AXES>> = MaybeUninit::uninit(),
         axes_place: MaybeUninit<Axes> = MaybeUninit::uninit(),
         boot_place: MaybeUninit<NetworkBoot<AXES>> = MaybeUninit::uninit(),
@@ -186,7 +186,7 @@ mod app {
                 phase: board.phase,
                 clock_us: board.microseconds,
                 commands: [AxisCommand::default(); AXES],
-                axes: new_axes(cx.local.group_place, cx.local.axes_place),
+                axes: new_axes(cx.local.group, cx.local.axes_place),
             },
             Local {
                 period: board.period,
@@ -233,10 +233,10 @@ mod app {
     /// stands in its frame lies below every interrupt's for ever.
     #[inline(never)]
     fn new_axes(
-        group: &'static mut MaybeUninit<Group<AXES>>,
+        group: &'static mut Group<AXES>,
         axes: &'static mut MaybeUninit<Axes>,
     ) -> &'static mut Axes {
-        let group = Group::new_in(group, &derived::GROUP);
+        group.configure(&derived::GROUP);
         axes.write(Axes::new(NETWORK, group))
     }
 

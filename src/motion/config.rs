@@ -22,8 +22,8 @@ pub struct AxisConfig {
     pub following_error_max: u32,
     /// Position error within which an axis has arrived, increments.
     pub in_position: u32,
-    /// The position loop.
-    pub tuning: Tuning,
+    /// Its units, from `increments_per_turn` and the cycle.
+    pub scale: Scale,
     /// Modes of operation that the drive has, as 6502h.
     pub modes: u32,
     /// The mode that it is configured for.
@@ -59,6 +59,8 @@ pub struct GroupConfig<const N: usize> {
     pub cycle: Duration,
     /// The axes, in the order of feedback and commands.
     pub axes: [AxisConfig; N],
+    /// The position loops.
+    pub tuning: Tuning,
     /// Time for all axes to reach the next state on the way to operation
     /// enabled.
     pub enable_timeout: Duration,
@@ -87,6 +89,7 @@ pub struct GroupConfig<const N: usize> {
 
 impl<const N: usize> GroupConfig<N> {
     /// Whole cycles that last at least `time`.
+    #[inline(never)]
     pub const fn cycles(&self, time: Duration) -> u32 {
         let cycle = self.cycle.as_micros();
         time.as_micros()
@@ -95,11 +98,7 @@ impl<const N: usize> GroupConfig<N> {
 
     /// The units of an axis, counted from 0; of the first if there is none.
     pub(in crate::motion) fn scale(&self, axis: u8) -> Scale {
-        let turn = self
-            .axes
-            .get(usize::from(axis))
-            .or(self.axes.first())
-            .map_or(1, |a| a.increments_per_turn);
-        Scale::new(turn, self.cycle)
+        let axis = self.axes.get(usize::from(axis)).or(self.axes.first());
+        axis.map_or(Scale::new(1, self.cycle), |axis| axis.scale)
     }
 }

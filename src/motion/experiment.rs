@@ -16,7 +16,7 @@
 use super::mode::Mode;
 use super::position_control::Tuning;
 use super::program::{AxisMove, Program, Step};
-use super::{AxisConfig, GroupConfig};
+use super::{AxisConfig, GroupConfig, Scale};
 use crate::time::Duration;
 
 /// A motor with its encoder, gear and limits, as the network describes them.
@@ -55,7 +55,7 @@ impl Motor {
             travel: (lower as i32, upper as i32),
             following_error_max: self.following_error(),
             in_position: 2,
-            tuning: Tuning::for_cycle(cycle),
+            scale: Scale::new(turn, cycle),
             modes: Mode::EPOS4,
             mode: Mode::ProfileVelocity,
             torque_max: TORQUE_MAX,
@@ -245,6 +245,7 @@ pub const fn group<const N: usize>(
     GroupConfig {
         cycle,
         axes,
+        tuning: Tuning::for_cycle(cycle),
         // A drive may wait for standstill for 1 s on the way down (30E0h:3).
         enable_timeout: Duration::from_millis(2000),
         missing_tpdo_max,

@@ -1,9 +1,9 @@
 //! Fixed-point numbers, by 32-bit instructions only.
 
 /// Bits behind the point of positions and velocities.
-pub(super) const BITS: u32 = 32;
+const BITS: u32 = 32;
 /// One increment.
-pub(super) const ONE: f32 = 4_294_967_296.0;
+const ONE: f32 = 4_294_967_296.0;
 /// Bits that accelerations have more.
 pub(super) const MORE: u32 = 12;
 const MORE_ONE: f32 = 4096.0;
@@ -25,7 +25,7 @@ pub(super) const fn round(x: i64) -> i32 {
 /// hardware can.
 #[inline(never)]
 pub(super) const fn float(x: i64) -> f32 {
-    (x >> BITS) as i32 as f32 + x as u32 as f32 / ONE
+    (x >> BITS) as i32 as f32 + x as u32 as f32 * (1.0 / ONE)
 }
 
 /// `x`, below 2^31, in 2^-32.

@@ -8,16 +8,20 @@
 //! cubic. Their rounding, at most a 64th of an increment in pieces of up to
 //! 10 000 cycles, is taken up by the next piece and by the last knot exactly.
 
-use super::fixed::{self, BITS, MORE, ONE};
-use super::position_control::Setpoint;
-use heapless::Deque;
+use super::fixed::{self, MORE};
 
-/// Knots that wait for their turn: those of a jerk-limited move, and of one that
-/// replaces it.
-pub const KNOTS: usize = 16;
+/// Knots that wait for their turn: those of a jerk-limited move, and what is left
+/// of the one that it replaces.
+pub const KNOTS: usize = 12;
+/// The most knots of one leg of a plan.
+pub const LEG_KNOTS: usize = 8;
+/// So many knots of a path may be kept until another replaces it.
+const KEPT: u8 = (KNOTS - LEG_KNOTS) as u8;
 /// Less than this, in increments, is the rounding of what came before: a ramp
 /// stays a ramp.
 const BEND_MIN: f32 = 1.0 / 64.0;
+const HALF: f32 = 0.5;
+const SIXTH: f32 = 1.0 / 6.0;
 
 /// Where an axis shall be and how fast.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -30,7 +34,7 @@ pub struct Knot {
     pub velocity: i64,
 }
 
-/// Where an axis should be at one SYNC.
+/// Where an axis should be at one SYNC, as exactly as a plan can go on from there.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Point {
     /// In 2^-32 increments.
@@ -50,236 +54,275 @@ impl Point {
             acceleration: 0.0,
         }
     }
-
-    /// As the position loop takes it.
-    pub(super) fn setpoint(&self) -> Setpoint {
-        Setpoint {
-            position: (self.position >> BITS) as i32,
-            fraction: self.position as u32 as f32 / ONE,
-            velocity: fixed::float(self.velocity),
-            acceleration: self.acceleration,
-        }
-    }
 }
 
-/// Where on its piece a path is.
-#[derive(Clone, Copy, Debug)]
-struct Cursor {
-    position: i64,
-    /// Forward differences: of the position in 2^-32, and its second and third
-    /// in 2^-44.
-    first: i64,
-    second: i64,
-    third: i64,
-    /// A sixth of the third.
-    sixth: i64,
-    /// Where the piece ends, and in how many cycles; 0: at rest, or run dry.
-    to: Knot,
+/// The same as the position loop takes it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sample {
+    /// In 2^-32 increments.
+    pub position: i64,
+    /// In increments per cycle.
+    pub velocity: f32,
+    /// In increments per cycle squared, as it is from here on.
+    pub acceleration: f32,
 }
 
-impl Cursor {
-    const fn at(point: &Point) -> Cursor {
-        Cursor {
-            position: point.position,
-            first: 0,
-            second: 0,
-            third: 0,
-            sixth: 0,
-            to: Knot {
-                cycles: 0,
-                position: point.position,
-                velocity: point.velocity,
-            },
+impl Sample {
+    /// At rest at a whole increment.
+    pub const fn at_rest(position: i32) -> Sample {
+        Sample {
+            position: fixed::whole(position),
+            velocity: 0.0,
+            acceleration: 0.0,
         }
-    }
-
-    fn point(&self) -> Point {
-        let Knot {
-            cycles, velocity, ..
-        } = self.to;
-        let (velocity, acceleration) = if cycles == 0 {
-            (velocity, 0.0)
-        } else {
-            (
-                self.first - (self.second >> (MORE + 1)) + (self.sixth >> (MORE - 1)),
-                fixed::float((self.second - self.third) >> MORE),
-            )
-        };
-        Point {
-            position: self.position,
-            velocity,
-            acceleration,
-        }
-    }
-
-    /// One cycle on; `next` gives the knots that follow.
-    #[inline(never)]
-    fn advance(&mut self, next: &mut dyn FnMut() -> Option<Knot>) -> Point {
-        if self.to.cycles == 0
-            && let Some(knot) = next()
-        {
-            self.begin(&knot);
-        }
-        if self.to.cycles > 0 {
-            self.position = self.position.wrapping_add(self.first);
-            self.first += self.second >> MORE;
-            self.second += self.third;
-            self.to.cycles -= 1;
-            if self.to.cycles == 0 {
-                self.position = self.to.position;
-                if let Some(knot) = next() {
-                    let velocity = self.to.velocity;
-                    return Point {
-                        position: self.position,
-                        velocity,
-                        acceleration: self.begin(&knot),
-                    };
-                }
-            }
-        }
-        self.point()
-    }
-
-    /// Begins the piece that leads to `knot`; the acceleration there.
-    #[inline(never)]
-    fn begin(&mut self, knot: &Knot) -> f32 {
-        let from = self.to.velocity;
-        let cycles = knot.cycles as f32;
-        let way = knot.position.wrapping_sub(self.position);
-        // What constant velocity leaves: small, so that single precision does.
-        let left = way.wrapping_sub(from.wrapping_mul(i64::from(knot.cycles)));
-        let gain = fixed::float(knot.velocity - from);
-        let mut bend = fixed::float(left) - 0.5 * gain * cycles;
-        if bend.abs() < BEND_MIN {
-            bend = 0.0;
-        }
-        let bend = 6.0 * bend / cycles;
-        let acceleration = (gain + bend) / cycles;
-        let jerk = -2.0 * bend / (cycles * cycles);
-        let steep = fixed::fine(acceleration);
-        self.third = fixed::fine(jerk);
-        self.sixth = fixed::fine(jerk / 6.0);
-        self.second = steep + self.third;
-        self.first = from + (((steep >> 1) + self.sixth) >> MORE);
-        self.to = *knot;
-        acceleration
     }
 }
 
 /// The path of one axis, evaluated from SYNC to SYNC.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Path {
-    cursor: Cursor,
-    queue: Deque<Knot, KNOTS>,
+    position: i64,
+    /// Forward differences: of the position in 2^-32, and its second and third
+    /// in 2^-44. At rest the first is the velocity at the last knot.
+    first: i64,
+    second: i64,
+    third: i64,
+    acceleration: f32,
+    jerk: f32,
+    /// Where the piece ends, and in how many cycles; 0: at rest, or run dry.
+    to: Knot,
+    /// What follows, from `begin` on.
+    knots: [Knot; KNOTS],
+    begin: u8,
+    len: u8,
     /// So many knots at the back belong to the path that replaces this one.
-    next: usize,
+    next: u8,
 }
 
 impl Path {
-    /// At rest.
-    pub const fn new(at: Point) -> Path {
-        Path {
-            cursor: Cursor::at(&at),
-            queue: Deque::new(),
-            next: 0,
-        }
+    /// At rest at 0.
+    pub const ZERO: Path = Path {
+        position: 0,
+        first: 0,
+        second: 0,
+        third: 0,
+        acceleration: 0.0,
+        jerk: 0.0,
+        to: Knot {
+            cycles: 0,
+            position: 0,
+            velocity: 0,
+        },
+        knots: [Knot {
+            cycles: 0,
+            position: 0,
+            velocity: 0,
+        }; KNOTS],
+        begin: 0,
+        len: 0,
+        next: 0,
+    };
+
+    /// Without knots.
+    pub fn new(at: &Point) -> Path {
+        let mut path = Path::ZERO;
+        path.restart(at);
+        path
     }
 
     /// Forgets everything: goes on from `at`.
     pub fn restart(&mut self, at: &Point) {
-        self.queue.clear();
+        self.len = 0;
         self.next = 0;
-        self.cursor = Cursor::at(at);
+        self.go_to(at.position, at.velocity);
     }
 
-    /// To rest in so many cycles, by one ramp from `at` on; `share` is one of them.
-    /// The cheapest of pieces: it is made between a SYNC and the next.
-    pub(super) fn brake(&mut self, at: &Point, cycles: u32, share: f32) {
-        self.restart(at);
-        if cycles > 0 {
-            let cursor = &mut self.cursor;
-            let steep = fixed::fine(-fixed::float(at.velocity) * share);
-            cursor.second = steep;
-            cursor.first = at.velocity + (steep >> (MORE + 1));
-            let way = (at.velocity >> 1).wrapping_mul(i64::from(cycles));
-            cursor.to = Knot {
-                cycles,
-                position: at.position.wrapping_add(way),
-                velocity: 0,
-            };
-        }
+    #[inline(never)]
+    fn go_to(&mut self, position: i64, velocity: i64) {
+        self.position = position;
+        self.to = Knot {
+            cycles: 0,
+            position,
+            velocity,
+        };
+        self.straight_on();
+    }
+
+    /// At constant velocity from the last knot on.
+    fn straight_on(&mut self) {
+        self.first = self.to.velocity;
+        (self.second, self.third) = (0, 0);
+        (self.acceleration, self.jerk) = (0.0, 0.0);
     }
 
     /// Whether the last knot is reached.
+    #[inline]
     pub fn is_over(&self) -> bool {
-        self.cursor.to.cycles == 0 && self.queue.len() <= self.next
+        self.to.cycles == 0 && self.len <= self.next
     }
 
     /// Whether it is over before it came to rest: knots were not pushed in time.
     pub fn is_dry(&self) -> bool {
-        self.is_over() && self.cursor.to.velocity != 0
+        self.is_over() && self.to.velocity != 0
     }
 
     /// Where its last knot is.
     pub fn end(&self) -> i64 {
-        let last = self.queue.back().unwrap_or(&self.cursor.to);
-        last.position
+        let last = self.len.checked_sub(1).and_then(|n| self.knot(n));
+        last.unwrap_or(&self.to).position
     }
 
     /// Room for more knots.
     pub fn room(&self) -> usize {
-        KNOTS - self.queue.len()
+        KNOTS - usize::from(self.len)
     }
 
-    /// The path that replaces this one is announced: as little as can be reached
-    /// until then is kept.
-    pub(super) fn announce(&mut self, cycles: usize) {
-        while self.queue.len() > cycles {
-            self.queue.pop_back();
+    fn place(&self, n: u8) -> usize {
+        usize::from(self.begin + n) % KNOTS
+    }
+
+    fn knot(&self, n: u8) -> Option<&Knot> {
+        self.knots.get(self.place(n))
+    }
+
+    /// How many knots the path needs for so many cycles.
+    fn needs(&self, cycles: u32) -> u8 {
+        let (mut knots, mut reached) = (0, self.to.cycles);
+        while reached < cycles && knots + self.next < self.len {
+            reached += self.knot(knots).map_or(0, |knot| knot.cycles);
+            knots += 1;
         }
+        knots
+    }
+
+    /// Whether there is room for a path that replaces this one in so many cycles.
+    pub(super) fn can_be_replaced(&self, cycles: u32) -> bool {
+        self.needs(cycles) <= KEPT
+    }
+
+    /// The path that replaces this one in so many cycles is announced: what it needs
+    /// until then is kept.
+    pub(super) fn announce(&mut self, cycles: u32) {
+        self.len = self.needs(cycles);
         self.next = 0;
     }
 
     /// Adds a knot, `announced` for the path that replaces this one. Without room
     /// it is left, and the path runs dry.
-    pub fn push(&mut self, knot: Knot, announced: bool) {
-        if knot.cycles > 0 && self.queue.push_back(knot).is_ok() && announced {
-            self.next += 1;
+    pub fn push(&mut self, knot: &Knot, announced: bool) {
+        if knot.cycles > 0 && self.room() > 0 {
+            let place = self.place(self.len);
+            if let Some(free) = self.knots.get_mut(place) {
+                *free = *knot;
+            }
+            self.len += 1;
+            self.next += u8::from(announced);
         }
     }
 
     /// Goes over to the path that was announced.
     pub fn cut(&mut self) {
-        while self.queue.len() > self.next {
-            self.queue.pop_front();
-        }
+        self.begin = self.place(self.len - self.next) as u8;
+        self.len = self.next;
         self.next = 0;
-        self.cursor = Cursor::at(&self.point());
+        let Point {
+            position, velocity, ..
+        } = self.point();
+        self.go_to(position, velocity);
     }
 
-    /// Where it stands.
+    /// Where it stands, in 2^-32 increments.
+    pub const fn position(&self) -> i64 {
+        self.position
+    }
+
+    /// Where it stands and how fast it goes on.
     pub fn point(&self) -> Point {
-        self.cursor.point()
+        Point {
+            position: self.position,
+            velocity: self.first - fixed::fixed(self.bent()),
+            acceleration: self.acceleration,
+        }
+    }
+
+    /// The same in single precision.
+    pub fn sample(&self) -> Sample {
+        Sample {
+            position: self.position,
+            velocity: fixed::float(self.first) - self.bent(),
+            acceleration: self.acceleration,
+        }
+    }
+
+    /// What the velocity of a cycle has more than that at its begin.
+    fn bent(&self) -> f32 {
+        HALF * self.acceleration + SIXTH * self.jerk
     }
 
     /// One cycle on.
     pub fn advance(&mut self) -> Point {
-        let (queue, next) = (&mut self.queue, self.next);
-        // What is announced waits for its step.
-        self.cursor.advance(&mut || match queue.len() > next {
-            true => queue.pop_front(),
-            false => None,
-        })
+        self.go_on();
+        self.point()
+    }
+
+    /// The same, without a look at where that is.
+    #[inline(never)]
+    pub(super) fn go_on(&mut self) {
+        if self.to.cycles == 0 {
+            self.begin();
+        }
+        if self.to.cycles > 0 {
+            self.position = self.position.wrapping_add(self.first);
+            self.first += self.second >> MORE;
+            self.second += self.third;
+            self.acceleration += self.jerk;
+            self.to.cycles -= 1;
+            if self.to.cycles == 0 {
+                self.position = self.to.position;
+                self.begin();
+            }
+        }
+    }
+
+    /// Begins the piece that leads to the next knot. What is announced waits for
+    /// its step.
+    fn begin(&mut self) {
+        let from = self.to.velocity;
+        self.straight_on();
+        if self.len <= self.next {
+            return;
+        }
+        let Some(&knot) = self.knot(0) else { return };
+        self.begin = self.place(1) as u8;
+        self.len -= 1;
+        self.to = knot;
+        let cycles = knot.cycles as f32;
+        let way = knot.position.wrapping_sub(self.position);
+        // What constant velocity leaves: small, so that single precision does.
+        let left = way.wrapping_sub(from.wrapping_mul(i64::from(knot.cycles)));
+        let mut gain = fixed::float(knot.velocity - from);
+        let bend = fixed::float(left) - HALF * gain * cycles;
+        if bend.abs() >= BEND_MIN {
+            const TWO: f32 = 2.0;
+            const SIX: f32 = 6.0;
+            let bend = SIX * bend / cycles;
+            gain += bend;
+            self.jerk = -TWO * bend / (cycles * cycles);
+            self.third = fixed::fine(self.jerk);
+            self.first += fixed::fixed(SIXTH * self.jerk);
+        }
+        self.acceleration = gain / cycles;
+        let steep = fixed::fine(self.acceleration);
+        self.second = steep + self.third;
+        self.first += steep >> (MORE + 1);
     }
 
     /// Where it will stand in so many cycles, as far as it is known.
     pub fn ahead(&self, cycles: u32) -> Point {
-        let mut cursor = self.cursor;
-        let mut knots = self.queue.iter().take(self.queue.len() - self.next);
-        let mut point = cursor.point();
+        let mut path = *self;
         for _ in 0..cycles {
-            point = cursor.advance(&mut || knots.next().copied());
+            path.go_on();
         }
-        point
+        path.point()
     }
 }

@@ -12,7 +12,7 @@
 //! ramp of the same length, so that nothing else changes.
 
 use super::fixed::{self, ceil};
-use super::path::{KNOTS, Knot, Point};
+use super::path::{Knot, LEG_KNOTS, Point};
 use heapless::Vec;
 
 /// Longest move in cycles: times stay exact in single precision.
@@ -22,10 +22,8 @@ pub const CYCLES_MAX: u32 = 1 << 22;
 const ROUNDS: u32 = 40;
 /// What single precision may make of a limit, relative.
 const ROUNDING: f32 = 1.0 + 1.0 / 131_072.0;
-/// Knots of a leg: one leads the acceleration to 0, three speed up, three brake.
-const LEG_KNOTS: usize = KNOTS / 2;
-
-/// The knots of one leg.
+/// The knots of one leg: one leads the acceleration to 0, three speed up, one keeps
+/// the velocity, three brake.
 pub type Knots = Vec<Knot, LEG_KNOTS>;
 
 /// One axis' part of a move, in increments and cycles; limits are positive.

@@ -16,18 +16,19 @@
 //!   velocity is exact and the last increment is reached. Inside the dead band
 //!   an axis whose reference rests is commanded 0: it does not hunt.
 
+use super::path::Sample;
 use super::scale::Scale;
 use crate::time::Duration;
 
-/// Properties of the position loop of one axis.
+/// Properties of the position loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tuning {
-    /// Proportional gain in 1/s. Its product with the loop's delay (1.5 cycles
+    /// Proportional gain in 1/cycle. Its product with the loop's delay (1.5 cycles
     /// and the lag) should stay below 0.35: then the loop does not overshoot.
     pub gain: f32,
-    /// Lag of the drive's velocity loop to start from, in seconds.
+    /// Lag of the drive's velocity loop to start from, in cycles.
     pub lag: f32,
-    /// Largest lag that can be learned, in seconds.
+    /// Largest lag that can be learned, in cycles.
     pub lag_max: f32,
     /// Share of a newly seen lag that is taken over per cycle, 0 .. 1.
     pub learning: f32,
@@ -37,34 +38,30 @@ pub struct Tuning {
     /// increments must not count as motion.
     pub creep_rpm: f32,
     /// Position error in increments within which a resting axis gets velocity 0.
-    pub dead_band: u32,
+    pub dead_band: f32,
 }
 
 impl Tuning {
-    /// For drives with a velocity loop of 3 .. 10 ms at a cycle of 10 ms.
-    pub const MILLISECONDS_10: Tuning = Tuning {
-        gain: 12.0,
-        lag: 0.005,
-        lag_max: 0.015,
-        learning: 0.03,
-        correction_rpm: 60.0,
-        creep_rpm: 3.0,
-        dead_band: 1,
-    };
-
-    /// For the same drives at another cycle: the gain falls with the delay of the
-    /// loop, 1.5 cycles and the lag.
+    /// For drives with a velocity loop of 3 .. 10 ms: the gain falls with the delay
+    /// of the loop, 1.5 cycles and the lag.
     pub const fn for_cycle(cycle: Duration) -> Tuning {
-        /// The product of gain and delay, per mille.
-        const GAIN_BY_DELAY: f32 = 300.0;
-        /// The lag that a drive is taken to have, in milliseconds.
-        const LAG_MS: f32 = 10.0;
+        /// The product of gain and delay.
+        const GAIN_BY_DELAY: f32 = 0.3;
+        /// The lag that a drive is taken to have at most, in microseconds.
+        const LAG_US: f32 = 10_000.0;
+        /// That to start from, and that which can be learned.
+        const FIRST_LAG_US: f32 = 5_000.0;
+        const LAG_MAX_US: f32 = 15_000.0;
         const CYCLES: f32 = 1.5;
-        const US_PER_MS: f32 = 1000.0;
-        let cycle_ms = cycle.as_micros() as f32 / US_PER_MS;
+        let cycle_us = cycle.as_micros() as f32;
         Tuning {
-            gain: GAIN_BY_DELAY / (CYCLES * cycle_ms + LAG_MS),
-            ..Tuning::MILLISECONDS_10
+            gain: GAIN_BY_DELAY / (CYCLES + LAG_US / cycle_us),
+            lag: FIRST_LAG_US / cycle_us,
+            lag_max: LAG_MAX_US / cycle_us,
+            learning: 0.03,
+            correction_rpm: 60.0,
+            creep_rpm: 3.0,
+            dead_band: 1.0,
         }
     }
 }
@@ -75,50 +72,21 @@ impl Tuning {
 /// drives of 3 .. 10 ms end nearest to their targets with this value.
 const STOPPING_SHORT: f32 = 1.0;
 
-/// Where an axis should be at one moment.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Setpoint {
-    /// Position in increments, rounded toward the nearer end of the move; wraps
-    /// as 6064h does.
-    pub position: i32,
-    /// What the rounding left over, in increments: -1.0 .. 1.0.
-    pub fraction: f32,
-    /// Increments per cycle.
-    pub velocity: f32,
-    /// Increments per cycle squared.
-    pub acceleration: f32,
-}
-
-impl Setpoint {
-    /// At rest at `position`.
-    pub const fn at_rest(position: i32) -> Setpoint {
-        Setpoint {
-            position,
-            fraction: 0.0,
-            velocity: 0.0,
-            acceleration: 0.0,
-        }
-    }
-
-    /// Reference minus `position`, in increments: the error that the position
-    /// loop sees. Right across the wrap of the 32-bit position.
-    pub fn minus(&self, position: i32) -> f32 {
-        self.position.wrapping_sub(position) as f32 + self.fraction
-    }
-}
-
 /// The reference around one SYNC, as the position loop needs it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Window {
+pub struct Window<'a> {
     /// At the SYNC just passed, when the position was sampled.
-    pub now: Setpoint,
+    pub now: &'a Sample,
     /// At the end of the cycle that the next command governs.
-    pub ahead: Setpoint,
+    pub ahead: &'a Sample,
     /// Velocity one cycle later, increments per cycle.
     pub beyond: f32,
+    /// Reference minus position at `now`, increments. Without it (the axis' TPDO is
+    /// missing) the axis is driven by feed-forward alone.
+    pub error: Option<f32>,
 }
 
-impl Window {
+impl Window<'_> {
     /// Whether the reference rests all through the window.
     fn rests(&self) -> bool {
         self.now.velocity == 0.0 && self.ahead.velocity == 0.0 && self.beyond == 0.0
@@ -126,86 +94,66 @@ impl Window {
 }
 
 /// The position loop of one axis: what it remembers from cycle to cycle.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct PositionControl {
-    scale: Scale,
-    tuning: Tuning,
-    /// The lag as learned so far, in cycles.
-    lag: f32,
-    lag_max: f32,
-    /// Gain per cycle.
-    gain: f32,
+    /// The lag as learned so far beyond that to start from, in cycles.
+    learned: f32,
     /// What rounding the last command to whole rpm left over, in rpm.
     carry: f32,
 }
 
 impl PositionControl {
     /// A loop that has learned nothing yet.
-    pub fn new(scale: Scale, tuning: Tuning) -> PositionControl {
+    pub const fn new() -> PositionControl {
         PositionControl {
-            scale,
-            tuning,
-            lag: scale.cycles(tuning.lag),
-            lag_max: scale.cycles(tuning.lag_max),
-            gain: scale.per_cycle(tuning.gain),
+            learned: 0.0,
             carry: 0.0,
         }
     }
 
-    /// The lag of the drive's velocity loop as learned so far, in cycles.
-    pub const fn lag(&self) -> f32 {
-        self.lag
-    }
-
     /// The target velocity (60FFh) in rpm that follows the reference, at most
     /// `limit` in magnitude.
-    ///
-    /// `position` is 6064h as sampled at `window.now`; without it (its TPDO is
-    /// missing) the axis is driven by feed-forward alone.
-    pub fn step(&mut self, window: &Window, position: Option<i32>, limit: u32) -> i32 {
-        let error = position.map(|p| window.now.minus(p) + self.stopping_short(&window.now));
+    pub fn step(&mut self, window: &Window<'_>, tuning: &Tuning, scale: Scale, limit: u32) -> i32 {
+        let lag = tuning.lag + self.learned;
         let mut correction = 0.0;
-        if let Some(error) = error {
-            if window.rests() && error.abs() <= self.tuning.dead_band as f32 {
+        if let Some(error) = window.error {
+            let Sample {
+                velocity,
+                acceleration,
+                ..
+            } = *window.now;
+            let rests = window.rests();
+            // The way by which an axis has to stay behind while it brakes: the
+            // advanced command reaches 0 a lag before the reference does and cannot
+            // undershoot, so that the axis would roll on when the ramp is over.
+            let mut error = error;
+            if acceleration * velocity < 0.0 {
+                error += STOPPING_SHORT * acceleration * lag * lag;
+            }
+            if rests && error.abs() <= tuning.dead_band {
                 self.carry = 0.0;
                 return 0;
             }
-            self.learn(window, error);
-            let bound = if window.rests() {
-                self.tuning.creep_rpm
+            let wanted = error * tuning.gain;
+            // A constant error while the reference accelerates is a wrong lag.
+            if acceleration != 0.0 && window.ahead.acceleration == acceleration {
+                let learned = self.learned + tuning.learning * wanted / acceleration;
+                self.learned = within(learned, -tuning.lag, tuning.lag_max - tuning.lag);
+            }
+            let bound = if rests {
+                tuning.creep_rpm
             } else {
-                self.tuning.correction_rpm
+                tuning.correction_rpm
             };
-            correction = within(self.scale.rpm(self.gain * error), -bound, bound);
+            correction = within(scale.rpm(wanted), -bound, bound);
         }
-        let advanced = window.ahead.velocity + self.lag * (window.beyond - window.ahead.velocity);
-        let wanted = self.scale.rpm(advanced) + correction + self.carry;
+        let ahead = window.ahead.velocity;
+        let advanced = ahead + (tuning.lag + self.learned) * (window.beyond - ahead);
+        let wanted = scale.rpm(advanced) + correction + self.carry;
         let limit = limit as f32;
         let command = round(within(wanted, -limit, limit));
         self.carry = within(wanted - command as f32, -1.0, 1.0);
         command
-    }
-
-    /// The way in increments by which an axis has to stay behind while it brakes.
-    ///
-    /// The advanced command reaches 0 a lag before the reference does and cannot
-    /// undershoot, so that the axis would roll on when the ramp is over.
-    fn stopping_short(&self, now: &Setpoint) -> f32 {
-        if now.acceleration * now.velocity < 0.0 {
-            STOPPING_SHORT * now.acceleration * self.lag * self.lag
-        } else {
-            0.0
-        }
-    }
-
-    /// A constant error while the reference accelerates is a wrong lag.
-    fn learn(&mut self, window: &Window, error: f32) {
-        let acceleration = window.now.acceleration;
-        if acceleration == 0.0 || window.ahead.acceleration != acceleration {
-            return;
-        }
-        let missing = error * self.gain / acceleration;
-        self.lag = within(self.lag + self.tuning.learning * missing, 0.0, self.lag_max);
     }
 }
 
@@ -233,54 +181,67 @@ mod tests {
 
     /// Increments per cycle that are 1 rpm with 2000 increments and 10 ms.
     const RPM: f32 = 1.0 / 3.0;
+    const CYCLE: Duration = Duration::from_millis(10);
+    const TUNING: Tuning = Tuning::for_cycle(CYCLE);
 
-    fn control() -> PositionControl {
-        let scale = Scale::new(2000, Duration::from_millis(10));
-        PositionControl::new(scale, Tuning::MILLISECONDS_10)
+    /// A step with 2000 increments for a turn and at most 3000 rpm.
+    fn step(control: &mut PositionControl, window: &Window<'_>) -> i32 {
+        control.step(window, &TUNING, Scale::new(2000, CYCLE), 3000)
     }
 
-    fn resting(position: i32) -> Window {
+    const REST: Sample = Sample::at_rest(0);
+
+    fn resting(error: f32) -> Window<'static> {
         Window {
-            now: Setpoint::at_rest(position),
-            ahead: Setpoint::at_rest(position),
+            now: &REST,
+            ahead: &REST,
             beyond: 0.0,
+            error: Some(error),
         }
     }
 
-    fn cruising(rpm: f32) -> Window {
-        let at = Setpoint {
+    fn moving(rpm: f32, acceleration: f32) -> Sample {
+        Sample {
             velocity: rpm * RPM,
-            ..Setpoint::at_rest(0)
-        };
+            acceleration,
+            position: 0,
+        }
+    }
+
+    fn along(at: &Sample, error: Option<f32>) -> Window<'_> {
         Window {
             now: at,
             ahead: at,
-            beyond: at.velocity,
+            beyond: at.velocity + at.acceleration,
+            error,
         }
     }
 
     #[test]
     fn the_tuning_follows_the_cycle() {
-        let of = |ms| Tuning::for_cycle(Duration::from_millis(ms));
-        assert_eq!(of(10), Tuning::MILLISECONDS_10);
-        assert!(of(2).gain > 20.0 && of(50).gain < 4.0);
+        let per_second = |ms: u16| {
+            let tuning = Tuning::for_cycle(Duration::from_millis(ms.into()));
+            tuning.gain * 1000.0 / f32::from(ms)
+        };
+        assert!((per_second(10) - 12.0).abs() < 1e-5);
+        assert!(per_second(2) > 20.0 && per_second(50) < 4.0);
     }
 
     #[test]
     fn a_resting_axis_inside_the_dead_band_gets_nothing() {
-        let mut control = control();
-        for error in [-1, 0, 1] {
-            assert_eq!(control.step(&resting(100), Some(100 - error), 3000), 0);
+        let mut control = PositionControl::new();
+        for error in [-1.0, 0.0, 1.0] {
+            assert_eq!(step(&mut control, &resting(error)), 0);
         }
     }
 
     #[test]
     fn creeping_is_slower_than_what_counts_as_motion() {
-        for error in [-1000, -20, 20, 1000] {
-            let mut control = control();
+        for error in [-1000i16, -20, 20, 1000] {
+            let mut control = PositionControl::new();
             for _ in 0..10 {
-                let rpm = control.step(&resting(0), Some(-error), 3000);
-                assert!(rpm.abs() <= 3 && rpm * error > 0, "{rpm}");
+                let rpm = step(&mut control, &resting(error.into()));
+                assert!(rpm.abs() <= 3 && rpm * i32::from(error) > 0, "{rpm}");
             }
         }
     }
@@ -288,36 +249,30 @@ mod tests {
     /// Two increments of error are 0.72 rpm: 72 of 100 cycles at 1 rpm.
     #[test]
     fn rounding_is_carried_on() {
-        let mut control = control();
-        let sum: i32 = (0..100)
-            .map(|_| control.step(&resting(2), Some(0), 3000))
-            .sum();
+        let mut control = PositionControl::new();
+        let sum: i32 = (0..100).map(|_| step(&mut control, &resting(2.0))).sum();
         assert_eq!(sum, 72);
     }
 
     #[test]
-    fn the_wrap_of_the_position_is_no_error() {
-        let mut control = control();
-        let window = resting(i32::MIN);
-        assert_eq!(control.step(&window, Some(i32::MAX), 3000), 0);
-    }
-
-    #[test]
     fn commands_keep_their_limits() {
-        let mut control = control();
-        assert_eq!(control.step(&cruising(5000.0), Some(0), 3000), 3000);
-        assert_eq!(control.step(&cruising(-5000.0), Some(0), 3000), -3000);
+        for rpm in [5000, -5000i16] {
+            let at = moving(rpm.into(), 0.0);
+            let command = step(&mut PositionControl::new(), &along(&at, Some(0.0)));
+            assert_eq!(command, 3000 * i32::from(rpm.signum()));
+        }
         // The correction is bounded as well.
-        let mut control = super::tests::control();
-        let rpm = control.step(&cruising(1000.0), Some(-100_000), 3000);
+        let at = moving(1000.0, 0.0);
+        let rpm = step(&mut PositionControl::new(), &along(&at, Some(100_000.0)));
         assert_eq!(rpm, 1060);
     }
 
     #[test]
     fn without_feedback_the_feed_forward_goes_on() {
-        let mut control = control();
+        let mut control = PositionControl::new();
+        let at = moving(750.0, 0.0);
         for _ in 0..10 {
-            assert_eq!(control.step(&cruising(750.0), None, 3000), 750);
+            assert_eq!(step(&mut control, &along(&at, None)), 750);
         }
     }
 
@@ -325,30 +280,21 @@ mod tests {
     /// acceleration, less the share already learned.
     #[test]
     fn the_lag_is_learned_and_bounded() {
-        let mut control = control();
+        let mut control = PositionControl::new();
         let acceleration = 3.0;
-        let at = Setpoint {
-            acceleration,
-            velocity: 100.0,
-            ..Setpoint::at_rest(0)
-        };
-        let window = Window {
-            now: at,
-            ahead: at,
-            beyond: 103.0,
-        };
+        let at = moving(300.0, acceleration);
         for _ in 0..300 {
-            let late = (0.9 - control.lag()) * acceleration / control.gain;
-            control.step(&window, Some(-round(late)), 3000);
+            let lag = TUNING.lag + control.learned;
+            let late = ((0.9 - lag) * acceleration / TUNING.gain).round();
+            step(&mut control, &along(&at, Some(late)));
         }
-        assert!((control.lag() - 0.9).abs() < 0.03, "{}", control.lag());
-        for _ in 0..1000 {
-            control.step(&window, Some(-100_000), 3000);
+        let lag = TUNING.lag + control.learned;
+        assert!((lag - 0.9).abs() < 0.03, "{lag}");
+        for (error, end) in [(100_000.0, TUNING.lag_max), (-100_000.0, 0.0)] {
+            for _ in 0..1000 {
+                step(&mut control, &along(&at, Some(error)));
+            }
+            assert!((TUNING.lag + control.learned - end).abs() < 1e-6);
         }
-        assert_eq!(control.lag(), control.lag_max);
-        for _ in 0..1000 {
-            control.step(&window, Some(100_000), 3000);
-        }
-        assert_eq!(control.lag(), 0.0);
     }
 }

@@ -13,6 +13,8 @@ const SECOND_US: f32 = 1_000_000.0;
 pub struct Scale {
     /// Increments per cycle that are 1 rpm.
     per_rpm: f32,
+    /// rpm that are one increment per cycle.
+    rpm: f32,
     /// Cycles per second.
     cycles_per_second: f32,
 }
@@ -21,8 +23,10 @@ impl Scale {
     /// The factors for an encoder of `increments_per_turn` and a cycle.
     pub const fn new(increments_per_turn: u32, cycle: Duration) -> Scale {
         let cycle_s = cycle.as_micros() as f32 / SECOND_US;
+        let per_rpm = increments_per_turn as f32 / MINUTE * cycle_s;
         Scale {
-            per_rpm: increments_per_turn as f32 / MINUTE * cycle_s,
+            per_rpm,
+            rpm: 1.0 / per_rpm,
             cycles_per_second: 1.0 / cycle_s,
         }
     }
@@ -39,17 +43,17 @@ impl Scale {
 
     /// rpm that are one increment per cycle.
     pub const fn rpm_per_increment(self) -> f32 {
-        1.0 / self.per_rpm
+        self.rpm
     }
 
     /// Increments per cycle to rpm.
     pub fn rpm(self, velocity: f32) -> f32 {
-        velocity / self.per_rpm
+        velocity * self.rpm
     }
 
     /// Increments per cycle squared to rpm/s.
     pub fn rpm_per_s(self, acceleration: f32) -> f32 {
-        acceleration * self.cycles_per_second / self.per_rpm
+        acceleration * self.cycles_per_second * self.rpm
     }
 
     /// Seconds to cycles.

@@ -400,7 +400,7 @@ fn a_path_that_runs_dry_is_a_fault() {
     let at = rig.group.predict(0, 0).unwrap();
     rig.group.push(
         0,
-        canmaster::motion::path::Knot {
+        &canmaster::motion::path::Knot {
             cycles: 50,
             position: at.position + (500 << 32),
             velocity: 20 << 32,

@@ -13,9 +13,9 @@ fn planned(legs: &[Option<Leg>]) -> (u32, Vec<Knots>) {
 }
 
 fn path(from: Point, knots: &[Knot]) -> Path {
-    let mut path = Path::new(from);
+    let mut path = Path::new(&from);
     for knot in knots {
-        path.push(*knot, false);
+        path.push(knot, false);
     }
     path
 }
@@ -263,7 +263,7 @@ fn the_announced_path_takes_over_in_its_step() {
     };
     let (cycles, knots) = planned(&[Some(back)]);
     for knot in &knots[0] {
-        path.push(*knot, true);
+        path.push(knot, true);
     }
     let before = (0..3).map(|_| path.advance()).last().unwrap();
     assert_eq!(before, from);

@@ -474,7 +474,7 @@ impl<const N: usize> Director<N> {
             let (mut up, mut down) = (0.0f32, 0.0f32);
             let mut speed = fixed::float(leg.from.velocity);
             for knot in knots {
-                group.push(axis, *knot);
+                group.push(axis, knot);
                 let next = fixed::float(knot.velocity);
                 let slope = (next - speed).abs() / knot.cycles.max(1) as f32;
                 if next.abs() > speed.abs() {
@@ -560,7 +560,7 @@ impl<const N: usize> Director<N> {
         while room(group) {
             for (axis, member) in format::members(generator.axes) {
                 match self.run.next(&generator, &self.begin, &scale, axis, member) {
-                    Some(knot) => group.push(axis, knot),
+                    Some(knot) => group.push(axis, &knot),
                     None => {
                         self.phase = Phase::Arriving { flying: false };
                         return;

@@ -2,154 +2,175 @@
 
 use super::AxisCommand;
 use super::drive_led::DriveLed;
-use crate::cia402::{self, Command, ControlWord, State, StatusWord};
+use crate::cia402::{self, State, StatusWord};
 use crate::motion::fixed;
 use crate::motion::mode::Mode;
-use crate::motion::path::{Knot, Path, Point};
-use crate::motion::position_control::{PositionControl, Window};
-use crate::motion::scale::Scale;
-use crate::motion::{AxisConfig, AxisFeedback, FaultCause, GroupConfig};
-use crate::time::Instant;
+use crate::motion::path::{Knot, Path, Point, Sample};
+use crate::motion::position_control::{PositionControl, Tuning, Window};
+use crate::motion::{AxisConfig, AxisFeedback};
 
 /// SYNCs that the path is ahead of the last sampled position: the next command
 /// acts at the next SYNC and lasts to the one after it; the position loop looks
 /// one further.
-const AHEAD: usize = 3;
+const AHEAD: u32 = 3;
+/// Where in the ring of samples those of the next SYNCs are, from now on.
+const NEXT: u32 = 1;
+const END: u32 = 2;
+const RING: usize = 4;
 
+/// How a state of the group leads an axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Lead {
+    /// It stays where it is.
+    Rest,
+    /// It follows its reference.
+    Follow,
+    /// It is to end the motion that its drive leads, or follows its reference.
+    Halt,
+    /// It follows its reference without the position loop.
+    Fault,
+}
+
+/// All of it is 0 before the group is configured.
 pub(super) struct Axis {
-    /// Its place in the group.
-    pub(super) n: u8,
-    pub(super) config: &'static AxisConfig,
-    pub(super) scale: Scale,
     /// What its drive reported in this cycle.
     pub(super) feedback: AxisFeedback,
     pub(super) machine: cia402::Axis,
-    /// As confirmed in 6061h.
-    pub(super) mode: Mode,
+    /// As confirmed in 6061h, if it is another one than configured.
+    pub(super) changed: Option<Mode>,
     /// The mode to change to.
     pub(super) wanted: Option<Mode>,
     pub(super) path: Path,
-    /// The reference at the SYNC just passed, and at the next ones.
-    points: [Point; AHEAD + 1],
+    /// The reference at the SYNC just passed, and at the next ones: a ring, in
+    /// which that of the step `n` is at `n` modulo its length.
+    samples: [Sample; RING],
+    /// The step that it counts from.
+    count: u32,
+    /// Reference minus position at the SYNC just passed, increments.
+    error: f32,
     /// Position that targets count from.
     pub(super) home: i32,
     pub(super) led: DriveLed,
     control: PositionControl,
     /// Last fresh statusword since the group began to enable.
-    status: Option<StatusWord>,
-    reported: Option<State>,
+    pub(super) status: Option<StatusWord>,
+    reported: Option<StatusWord>,
     /// Consecutive cycles without TPDO.
     pub(super) missing: u8,
-    /// Left out: nothing is asked of it.
-    pub(super) absent: bool,
-    /// A fault of this axis has been reported.
-    pub(super) faulted: bool,
-    /// The drive itself has taken the axis out of the master's hands.
-    pub(super) excluded: bool,
-    /// That has been reported, or there was nothing to report.
-    pub(super) coasting: bool,
-    /// Its part of the last path is done, and that was reported.
-    pub(super) arrived: bool,
     /// Consecutive cycles in position, or at standstill.
-    settled: u8,
+    pub(super) settled: u8,
     /// Cycles since the path was over.
-    over: u32,
-    output: AxisCommand,
+    pub(super) over: u32,
+    /// What was commanded last.
+    target: i32,
+    /// 6083h and 6084h, rpm/s.
+    up: u32,
+    down: u32,
 }
 
 impl Axis {
-    pub(super) fn new<const N: usize>(
-        n: u8,
-        config: &'static AxisConfig,
-        group: &'static GroupConfig<N>,
-    ) -> Axis {
-        let scale = Scale::new(config.increments_per_turn, group.cycle);
-        let rest = Point::at_rest(0);
-        Axis {
-            n,
-            config,
-            scale,
-            feedback: AxisFeedback::default(),
-            machine: cia402::Axis::new(group.enable_timeout),
-            mode: config.mode,
-            wanted: None,
-            path: Path::new(rest),
-            points: [rest; AHEAD + 1],
-            home: 0,
-            led: DriveLed::new(),
-            control: PositionControl::new(scale, config.tuning),
-            status: None,
-            reported: None,
-            missing: 0,
-            absent: false,
-            faulted: false,
-            excluded: false,
-            coasting: false,
-            arrived: true,
-            settled: 0,
-            over: 0,
-            output: AxisCommand {
-                acceleration: group.ramp_min,
-                deceleration: group.ramp_min,
-                ..AxisCommand::default()
-            },
-        }
-    }
+    pub(super) const ZERO: Axis = Axis {
+        feedback: AxisFeedback {
+            statusword: 0,
+            position: 0,
+            velocity: 0,
+            torque: 0,
+            fresh: false,
+        },
+        machine: cia402::Axis::new(),
+        changed: None,
+        wanted: None,
+        path: Path::ZERO,
+        samples: [Sample::at_rest(0); RING],
+        count: 0,
+        error: 0.0,
+        home: 0,
+        led: DriveLed::new(),
+        control: PositionControl::new(),
+        status: None,
+        reported: None,
+        missing: 0,
+        settled: 0,
+        over: 0,
+        target: 0,
+        up: 0,
+        down: 0,
+    };
 
-    /// Forgets what was heard and what went wrong, before enabling.
-    pub(super) fn restart(&mut self, absent: u32) {
-        self.absent = self.is_in(absent);
+    /// Forgets what was heard, before enabling.
+    pub(super) fn restart(&mut self) {
         self.status = None;
         self.missing = 0;
-        self.faulted = false;
-        self.excluded = false;
-        self.coasting = false;
-        self.arrived = true;
         self.led = DriveLed::new();
     }
 
-    /// Whether a set of axes, bit n for axis n, holds it.
-    pub(super) fn is_in(&self, axes: u32) -> bool {
-        axes >> (self.n % u32::BITS as u8) & 1 != 0
+    pub(super) fn mode(&self, config: &AxisConfig) -> Mode {
+        self.changed.unwrap_or(config.mode)
     }
 
     /// Takes in this cycle's feedback and goes one cycle on; returns the state of
     /// the drive if it is another one than last reported.
-    pub(super) fn hear(&mut self, feedback: &AxisFeedback, cut: bool) -> Option<State> {
+    #[inline(never)]
+    pub(super) fn hear(
+        &mut self,
+        feedback: &AxisFeedback,
+        count: u32,
+        cut: bool,
+    ) -> Option<State> {
+        self.count = count;
         if cut {
             self.path.cut();
             self.settled = 0;
             self.over = 0;
         }
+        // At rest all samples are the same.
         let over = self.path.is_over();
-        // At rest all points are the same.
         if !(over && self.ended()) {
-            let head = self.path.advance();
-            let [now, next, ahead, beyond] = &mut self.points;
-            (*now, *next, *ahead, *beyond) = (*next, *ahead, *beyond, head);
+            self.go_on(AHEAD);
         }
-        self.over = if over && self.path.is_over() {
-            self.over.saturating_add(1)
-        } else {
-            0
-        };
+        self.over = if over { self.over.saturating_add(1) } else { 0 };
         self.feedback = *feedback;
         if !feedback.fresh {
             self.missing = self.missing.saturating_add(1);
             return None;
         }
         self.missing = 0;
+        let at = fixed::whole(feedback.position);
+        self.error = fixed::float(self.sample(0).position.wrapping_sub(at));
         let status = StatusWord(feedback.statusword);
         self.status = Some(status);
+        if self.reported.is_some_and(|last| last.shows_as(status)) {
+            return None;
+        }
+        let before = self.reported.replace(status).map(StatusWord::state);
         let state = status.state();
-        let changed = self.reported != Some(state);
-        self.reported = Some(state);
-        changed.then_some(state)
+        (before != Some(state)).then_some(state)
+    }
+
+    /// The next point of the path, as that of so many cycles ahead.
+    fn go_on(&mut self, ahead: u32) {
+        self.path.go_on();
+        let sample = self.path.sample();
+        let place = self.count.wrapping_add(ahead) as usize % RING;
+        if let Some(place) = self.samples.get_mut(place) {
+            *place = sample;
+        }
+    }
+
+    fn sample(&self, ahead: u32) -> &Sample {
+        let place = self.count.wrapping_add(ahead) as usize % RING;
+        const REST: &Sample = &Sample::at_rest(0);
+        self.samples.get(place).unwrap_or(REST)
     }
 
     /// The state last heard since enabling began.
     pub(super) fn state(&self) -> Option<State> {
         self.status.map(StatusWord::state)
+    }
+
+    /// Whether that was operation enabled.
+    pub(super) fn is_enabled(&self) -> bool {
+        self.status.is_some_and(StatusWord::is_enabled)
     }
 
     pub(super) fn fresh_status(&self) -> Option<StatusWord> {
@@ -159,235 +180,153 @@ impl Axis {
         fresh.then_some(StatusWord(statusword))
     }
 
-    /// Reference minus actual position at the SYNC just passed.
+    /// Reference minus actual position when it was last heard, increments.
     pub(super) fn error(&self) -> i32 {
-        let [now, ..] = &self.points;
-        let at = fixed::whole(self.feedback.position);
-        (now.position.wrapping_sub(at) / fixed::whole(1)) as i32
-    }
-
-    /// The reference one cycle behind the command that goes out now: where it
-    /// ends.
-    pub(super) const fn ahead(&self) -> &Point {
-        let [.., ahead, _] = &self.points;
-        ahead
+        self.error as i32
     }
 
     /// Where the path stands.
-    pub(super) const fn head(&self) -> &Point {
-        let [.., head] = &self.points;
-        head
+    pub(super) fn head(&self) -> i32 {
+        fixed::round(self.path.position())
     }
 
     /// At rest where it is: the next release starts there. A torque rests at 0.
-    pub(super) fn hold_actual(&mut self) {
-        let position = match self.sent_mode() {
+    #[inline(never)]
+    pub(super) fn hold_actual(&mut self, config: &AxisConfig) {
+        let position = match self.sent_mode(config) {
             Mode::CyclicTorque => 0,
             _ if self.feedback.fresh => self.feedback.position,
-            _ => fixed::round(self.ahead().position),
+            _ => fixed::round(self.sample(END).position),
         };
-        let rest = Point::at_rest(position);
-        self.points = [rest; AHEAD + 1];
-        self.path.restart(&rest);
+        self.samples = [Sample::at_rest(position); RING];
+        self.path.restart(&Point::at_rest(position));
         self.settled = 0;
     }
 
-    /// The drive's ramps for what follows, rpm/s, each with room for the position
-    /// loop.
-    pub(super) fn set_ramps<const N: usize>(&mut self, up: f32, down: f32, group: &GroupConfig<N>) {
-        let ramp = |slope: f32| {
-            const HUNDRED: f32 = 100.0;
-            let wanted = slope * (group.ramp_percent as f32 / HUNDRED);
-            (wanted as u32).max(group.ramp_min)
-        };
-        self.output.acceleration = ramp(up);
-        self.output.deceleration = ramp(down);
+    /// The drive's ramps for what follows, rpm/s.
+    pub(super) fn set_ramps(&mut self, up: f32, down: f32) {
+        self.up = up as u32;
+        self.down = down as u32;
     }
 
     /// Speed from which a stop begins, rpm: of the reference, after a fault of
     /// what was last commanded; of a torque, of the motor.
-    pub(super) fn speed(&self, fault: bool) -> f32 {
-        match self.mode {
-            _ if self.excluded || self.absent || self.mode.is_led_by_drive() => 0.0,
+    pub(super) fn speed(&self, fault: bool, config: &AxisConfig) -> f32 {
+        match self.mode(config) {
+            mode if mode.is_led_by_drive() => 0.0,
             Mode::CyclicTorque => self.feedback.velocity as f32,
-            mode if fault && mode.is_velocity() => self.output.target as f32,
-            _ => self.scale.rpm(fixed::float(self.points[1].velocity)),
+            mode if fault && mode.is_velocity() => self.target as f32,
+            _ => config.scale.rpm(self.sample(NEXT).velocity),
         }
     }
 
-    /// Replaces the path by a ramp of so many cycles from the next SYNC on; `share`
-    /// is one of them.
-    pub(super) fn stop<const N: usize>(
-        &mut self,
-        cycles: u32,
-        share: f32,
-        speed: f32,
-        fault: bool,
-        group: &GroupConfig<N>,
-    ) {
+    /// Replaces the path by a ramp from `speed` in so many cycles from the next SYNC
+    /// on. The slope of it in rpm/s.
+    #[inline(never)]
+    pub(super) fn stop(&mut self, cycles: u32, speed: f32, config: &AxisConfig) -> f32 {
         self.settled = 0;
         self.over = 0;
-        let [_, mut from, ..] = self.points;
-        if cycles == 0 {
-            from.velocity = 0;
-        }
-        if self.mode.has_position() {
-            if fault {
-                from.velocity = fixed::fixed(self.scale.velocity(speed));
-            }
-            let slope = self.scale.cycles(speed.abs() * share);
-            self.set_ramps(slope, slope, group);
-            self.path.brake(&from, cycles, share);
+        let from = *self.sample(NEXT);
+        let mut at = Point {
+            position: from.position,
+            ..Point::default()
+        };
+        let mut end = Knot {
+            cycles,
+            ..Knot::default()
+        };
+        let mut slope = 0.0;
+        if self.mode(config) == Mode::CyclicTorque {
+            at.velocity = fixed::fixed(from.velocity);
         } else {
-            self.path.restart(&from);
-            let end = Knot {
-                cycles,
-                ..Knot::default()
-            };
-            self.path.push(end, false);
+            at.velocity = fixed::fixed(config.scale.velocity(speed));
+            let way = (at.velocity >> 1).wrapping_mul(i64::from(cycles));
+            end.position = at.position.wrapping_add(way);
+            slope = config.scale.cycles(speed.abs() / cycles as f32);
         }
-        let [.., ahead, beyond] = &mut self.points;
-        *ahead = self.path.advance();
-        *beyond = self.path.advance();
-    }
-
-    /// Begins the stop after a fault. Axes that their drives do not hold enabled
-    /// are excluded; that is news only if they `were_enabled`.
-    pub(super) fn begin_fault_stop(&mut self, were_enabled: bool) {
-        self.settled = 0;
-        if self.absent || !self.state().is_some_and(State::is_enabled) {
-            self.excluded = true;
-            self.coasting = self.absent || !were_enabled;
-        }
+        self.path.restart(&at);
+        self.path.push(&end, false);
+        self.go_on(END);
+        self.go_on(AHEAD);
+        slope
     }
 
     /// Whether the path is over and the SYNC just passed lies behind its end.
     pub(super) fn ended(&self) -> bool {
-        self.over >= AHEAD as u32
+        self.over >= AHEAD
     }
 
-    /// Whether it has come to rest since its path ended, `on_target` or wherever
-    /// it is; then with its error. An error if that takes too long.
-    pub(super) fn comes_to_rest<const N: usize>(
-        &mut self,
-        on_target: bool,
-        group: &GroupConfig<N>,
-    ) -> Result<Option<i32>, FaultCause> {
-        if self.mode.is_led_by_drive() && on_target {
-            let limit = group.cycles(group.enable_timeout);
-            return self.led.outcome(self.mode, limit);
-        }
-        if !self.ended() {
-            return Ok(None);
-        }
-        let error = self.error();
-        let near = on_target && self.mode.has_position();
-        if self.settle(near.then_some(error), group) {
-            return Ok(Some(if near { error } else { 0 }));
-        }
-        if self.over
-            > group
-                .cycles(group.settle_timeout)
-                .saturating_add(AHEAD as u32)
-        {
-            return Err(FaultCause::NotArrived { error });
-        }
-        Ok(None)
+    /// How long it has waited to come to rest since its path ended, in cycles.
+    pub(super) fn waited(&self) -> u32 {
+        self.over.saturating_sub(AHEAD)
     }
 
-    /// Counts cycles at rest, within `error` if one is given, and says whether
-    /// they are enough.
-    pub(super) fn settle<const N: usize>(
-        &mut self,
-        error: Option<i32>,
-        group: &GroupConfig<N>,
-    ) -> bool {
+    /// Counts cycles at rest, not farther than `near` from the reference, and says
+    /// whether they are `enough`.
+    #[inline(never)]
+    pub(super) fn settle(&mut self, near: u32, slow: u32, enough: u8) -> bool {
         if self.feedback.fresh {
-            let near = error.is_none_or(|e| e.unsigned_abs() <= self.config.in_position);
-            let at_rest = self.feedback.velocity.unsigned_abs() <= group.standstill_rpm;
-            self.settled = if near && at_rest {
+            let still = self.error().unsigned_abs() <= near
+                && self.feedback.velocity.unsigned_abs() <= slow;
+            self.settled = if still {
                 self.settled.saturating_add(1)
             } else {
                 0
             };
         }
-        self.settled >= group.settle_cycles
+        self.settled >= enough
     }
 
     /// The mode whose RPDO is sent: the new one while the mode is being changed.
-    fn sent_mode(&self) -> Mode {
-        self.wanted.unwrap_or(self.mode)
+    fn sent_mode(&self, config: &AxisConfig) -> Mode {
+        self.wanted.unwrap_or(self.mode(config))
     }
 
-    /// A command, and target 0, or the reference where that is a position.
-    pub(super) fn command(&mut self, command: Command) -> AxisCommand {
-        self.rest_with(ControlWord::new(command))
-    }
-
-    /// As the state machine says, at rest.
-    pub(super) fn rest(&mut self, now: Instant) -> AxisCommand {
-        let word = self.machine.step(now, self.fresh_status());
-        self.rest_with(word)
-    }
-
-    fn rest_with(&mut self, word: ControlWord) -> AxisCommand {
-        let mode = self.sent_mode();
-        self.output.mode = mode;
-        self.output.controlword = word.0;
-        self.output.target = if mode.rpdo() == Mode::CyclicPosition.rpdo() {
-            fixed::round(self.ahead().position)
-        } else {
-            0
-        };
-        self.output
-    }
-
-    /// Along the reference; after a fault without the position loop. `halt`: the
-    /// drive leads the motion and shall end it.
-    pub(super) fn follow(&mut self, now: Instant, fault: bool, halt: bool) -> AxisCommand {
-        let word = if fault {
-            ControlWord::new(Command::EnableOperation)
-        } else {
-            self.machine.step(now, self.fresh_status())
-        };
-        let mode = self.mode;
-        self.output.mode = mode;
-        self.output.controlword = word.0;
-        self.output.target = match mode {
-            Mode::ProfileVelocity | Mode::CyclicVelocity => self.velocity(fault),
-            Mode::CyclicPosition => fixed::round(self.ahead().position),
-            Mode::CyclicTorque => {
-                let most = i32::from(self.config.torque_max);
-                fixed::round(self.ahead().position).min(most).max(-most)
-            }
-            Mode::ProfilePosition | Mode::Homing => {
-                self.output.controlword = word.0 | self.led.bits(halt);
+    /// Fills in what is sent with the controlword `word`.
+    #[inline(never)]
+    pub(super) fn command(
+        &mut self,
+        word: u16,
+        lead: Lead,
+        config: &AxisConfig,
+        tuning: &Tuning,
+        out: &mut AxisCommand,
+    ) {
+        let mode = self.sent_mode(config);
+        let end = fixed::round(self.sample(END).position);
+        out.mode = mode;
+        out.controlword = word;
+        self.target = match mode {
+            Mode::ProfilePosition | Mode::Homing if lead != Lead::Rest => {
+                out.controlword |= self.led.bits(lead == Lead::Halt);
                 self.led.target
             }
+            Mode::CyclicPosition | Mode::ProfilePosition => end,
+            _ if lead == Lead::Rest => 0,
+            Mode::CyclicTorque => {
+                let most = i32::from(config.torque_max);
+                end.min(most).max(-most)
+            }
+            _ if lead == Lead::Fault => config.scale.rpm(self.sample(END).velocity) as i32,
+            _ => {
+                // Not by `sample`: the loop is another part of the axis.
+                let at = |ahead: u32| self.count.wrapping_add(ahead) as usize % RING;
+                let [now, ahead, beyond] = [0, END, AHEAD].map(|ahead| self.samples.get(at(ahead)));
+                let (Some(now), Some(ahead), Some(beyond)) = (now, ahead, beyond) else {
+                    return;
+                };
+                let window = Window {
+                    now,
+                    ahead,
+                    beyond: beyond.velocity,
+                    error: self.feedback.fresh.then_some(self.error),
+                };
+                self.control
+                    .step(&window, tuning, config.scale, config.velocity_max)
+            }
         };
-        self.output
+        out.target = self.target;
+        out.acceleration = self.up;
+        out.deceleration = self.down;
     }
-
-    /// The velocity that leads to where the reference is ahead.
-    fn velocity(&mut self, fault: bool) -> i32 {
-        let [now, _, ahead, beyond] = &self.points;
-        if fault {
-            return self.scale.rpm(fixed::float(ahead.velocity)) as i32;
-        }
-        let window = Window {
-            now: now.setpoint(),
-            ahead: ahead.setpoint(),
-            beyond: fixed::float(beyond.velocity),
-        };
-        let position = self.feedback.fresh.then_some(self.feedback.position);
-        self.control
-            .step(&window, position, self.config.velocity_max)
-    }
-}
-
-/// Whole cycles to come from `rpm` to rest.
-pub(super) fn stop_cycles<const N: usize>(rpm: f32, group: &GroupConfig<N>) -> u32 {
-    const SECOND_US: f32 = 1e6;
-    let per_cycle = group.stop_deceleration as f32 * (group.cycle.as_micros() as f32 / SECOND_US);
-    fixed::ceil(rpm.abs() / per_cycle)
 }

@@ -58,7 +58,7 @@ impl DriveLed {
         DriveLed {
             phase: Phase::Done,
             waited: 0,
-            limit: u32::MAX,
+            limit: 0,
             target: 0,
             flags: 0,
         }

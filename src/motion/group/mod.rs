@@ -14,15 +14,14 @@ mod watch;
 pub use drive_led::SetPoint;
 pub use order::Order;
 
-use self::axis::{Axis, stop_cycles};
+use self::axis::{Axis, Lead};
 use super::contract::{Cell, Event, cell};
 use super::mode::Mode;
 use super::path::{Knot, Point};
-use super::{FaultCause, GroupConfig, GroupEvent, GroupState};
-use crate::cia402::{Command, Goal, State};
+use super::{AxisConfig, FaultCause, GroupConfig, GroupEvent, GroupState, fixed};
+use crate::cia402::{Command, ControlWord, Goal, State};
 use crate::time::Instant;
-use core::mem::MaybeUninit;
-use heapless::{Deque, Vec};
+use heapless::Deque;
 
 /// Events kept until they are taken: enough for the busiest step, in which every
 /// one of six axes fails.
@@ -87,6 +86,8 @@ pub struct AxisView {
     pub feedback: AxisFeedback,
     /// Where it should be, increments; in torque mode per mille.
     pub reference: i32,
+    /// Reference minus actual position at the SYNC of that, increments.
+    pub following_error: i32,
     /// Where its path ends, as far as it is known.
     pub end: i32,
     /// Position from which targets count.
@@ -110,30 +111,47 @@ pub struct ModeWanted {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TooLate;
 
+/// A set of axes: bit n for axis n.
+type Axes = u32;
+
+const fn bit(n: usize) -> Axes {
+    1 << (n % Axes::BITS as usize)
+}
+
 /// `N` axes moved in step; see the module.
+///
+/// Until it is configured all of it is 0, so that it needs no room in an image.
 pub struct Group<const N: usize> {
-    config: &'static GroupConfig<N>,
-    /// All `N`: a vector, so that they can be made one by one where they stay.
-    axes: Vec<Axis, N>,
+    config: Option<&'static GroupConfig<N>>,
+    axes: [Axis; N],
     state: GroupState,
     now: Instant,
     /// Steps so far, and since the state was entered.
     count: u32,
     since: u32,
-    /// Somebody wants the axes enabled.
-    wanted: bool,
-    /// What was ordered since the last step.
-    ordered: Option<Order>,
-    /// A path that replaces what its axes follow: from which step on, and whose.
-    announced: Option<(u32, u32)>,
+    /// Nobody wants the axes enabled.
+    unwanted: bool,
+    /// What was ordered since the last step; to enable: nothing.
+    ordered: Order,
+    /// Whose path is replaced by one that is announced, and from which step on.
+    announced: Axes,
+    start: u32,
     /// Where all axes go together while enabling.
     stage: Goal,
     /// Since the fault, the network has gone down, or an axis at fault is left
     /// out.
     network_was_down: bool,
     network_ready: bool,
-    /// The axes left out since the group began to enable.
-    absent: u32,
+    /// Left out since the group began to enable: nothing is asked of them.
+    absent: Axes,
+    /// A fault of them has been reported.
+    faulted: Axes,
+    /// Their own drives have taken them out of the master's hands.
+    excluded: Axes,
+    /// That has been reported, or there was nothing to report.
+    coasting: Axes,
+    /// Their part of the last path is not done yet.
+    busy: Axes,
     events: Events,
 }
 
@@ -152,51 +170,62 @@ impl Events {
     }
 }
 
+/// What is sent in a state: the controlword, and how the axes are led. Without a
+/// lead each goes by its own state machine.
+const fn sent(state: GroupState) -> (Command, Option<Lead>) {
+    const REST: Option<Lead> = Some(Lead::Rest);
+    match state {
+        GroupState::Idle | GroupState::Faulted => (Command::DisableVoltage, REST),
+        GroupState::Enabling | GroupState::Disabling => (Command::DisableVoltage, None),
+        GroupState::Standby | GroupState::ModeChange => (Command::EnableOperation, REST),
+        GroupState::Moving | GroupState::Homing => (Command::EnableOperation, Some(Lead::Follow)),
+        GroupState::Stopping | GroupState::Halt => (Command::EnableOperation, Some(Lead::Halt)),
+        GroupState::FaultStop => (Command::EnableOperation, Some(Lead::Fault)),
+        GroupState::QuickStop => (Command::QuickStop, REST),
+    }
+}
+
 impl<const N: usize> Group<N> {
+    /// Before it is configured: it does nothing.
+    pub const ZERO: Group<N> = Group {
+        config: None,
+        axes: [Axis::ZERO; N],
+        state: GroupState::Idle,
+        now: Instant::ZERO,
+        count: 0,
+        since: 0,
+        unwanted: false,
+        ordered: Order::Enable,
+        announced: 0,
+        start: 0,
+        stage: Goal::Disabled,
+        network_was_down: false,
+        network_ready: false,
+        absent: 0,
+        faulted: 0,
+        excluded: 0,
+        coasting: 0,
+        busy: 0,
+        events: Events {
+            queue: Deque::new(),
+            lost: 0,
+        },
+    };
+
     /// A group in [`GroupState::Idle`] whose axes are enabled as soon as the
     /// network is ready.
     pub fn new(config: &'static GroupConfig<N>) -> Group<N> {
-        let mut group = Group::without_axes(config);
-        group.add_axes();
+        let mut group = Group::ZERO;
+        group.configure(config);
         group
     }
 
-    /// The same, made where it is to stay, without a copy on the stack.
-    pub fn new_in<'a>(
-        place: &'a mut MaybeUninit<Group<N>>,
-        config: &'static GroupConfig<N>,
-    ) -> &'a mut Group<N> {
-        let group = place.write(Group::without_axes(config));
-        group.add_axes();
-        group
-    }
-
-    fn add_axes(&mut self) {
-        for (n, axis) in (0..).zip(&self.config.axes) {
-            // There is room: both are `N`.
-            let _ = self.axes.push(Axis::new(n, axis, self.config));
-        }
-    }
-
-    const fn without_axes(config: &'static GroupConfig<N>) -> Group<N> {
-        Group {
-            config,
-            axes: Vec::new(),
-            state: GroupState::Idle,
-            now: Instant::ZERO,
-            count: 0,
-            since: 0,
-            wanted: true,
-            ordered: None,
-            announced: None,
-            stage: Goal::Disabled,
-            network_was_down: false,
-            network_ready: false,
-            absent: 0,
-            events: Events {
-                queue: Deque::new(),
-                lost: 0,
-            },
+    /// Makes the same of [`Group::ZERO`], where it is to stay.
+    pub fn configure(&mut self, config: &'static GroupConfig<N>) {
+        self.config = Some(config);
+        let ramp = config.ramp_min as f32;
+        for axis in &mut self.axes {
+            axis.set_ramps(ramp, ramp);
         }
     }
 
@@ -212,16 +241,19 @@ impl<const N: usize> Group<N> {
 
     /// One axis, counted from 0.
     pub fn view(&self, axis: usize) -> Option<AxisView> {
+        let config = self.config?.axes.get(axis)?;
+        let bit = bit(axis);
         let axis = self.axes.get(axis)?;
         Some(AxisView {
-            mode: axis.mode,
+            mode: axis.mode(config),
             state: axis.state(),
             feedback: axis.feedback,
-            reference: super::fixed::round(axis.head().position),
-            end: super::fixed::round(axis.path.end()),
+            reference: axis.head(),
+            following_error: axis.error(),
+            end: fixed::round(axis.path.end()),
             home: axis.home,
-            absent: axis.absent,
-            faulted: axis.faulted,
+            absent: self.absent & bit != 0,
+            faulted: self.faulted & bit != 0,
         })
     }
 
@@ -243,26 +275,32 @@ impl<const N: usize> Group<N> {
     /// the knots are pushed from now on. They count as moving from now on.
     ///
     /// # Errors
-    /// [`TooLate`] if that step was, or the group is not released.
+    /// [`TooLate`] if that step was, or the group is not released, or so much of
+    /// the old path is still to come that there is no room.
     pub fn announce(&mut self, start: u32, axes: u32) -> Result<(), TooLate> {
         const FAR: u32 = 1 << 8;
         let left = start.wrapping_sub(self.count);
-        if left == 0 || left > FAR || self.state != GroupState::Moving {
+        let fits = |(n, axis): (usize, &Axis)| axes & bit(n) == 0 || axis.path.can_be_replaced(left);
+        let fit = self.axes.iter().enumerate().all(fits);
+        if left == 0 || left > FAR || self.state != GroupState::Moving || !fit {
             return Err(TooLate);
         }
-        for axis in self.axes.iter_mut().filter(|axis| axis.is_in(axes)) {
-            axis.path.announce(left as usize);
-            axis.arrived = axis.absent;
+        for (n, axis) in self.axes.iter_mut().enumerate() {
+            if axes & bit(n) != 0 {
+                axis.path.announce(left);
+            }
         }
-        self.announced = Some((start, axes));
+        self.busy |= axes;
+        self.announced = axes;
+        self.start = start;
         Ok(())
     }
 
     /// Adds a knot to the path of an axis: to that announced, if one is.
-    pub fn push(&mut self, axis: usize, knot: Knot) {
-        let announced = self.announced.map_or(0, |(_, axes)| axes);
+    pub fn push(&mut self, axis: usize, knot: &Knot) {
+        let announced = self.announced & bit(axis) != 0;
         if let Some(axis) = self.axes.get_mut(axis) {
-            axis.path.push(knot, axis.is_in(announced));
+            axis.path.push(knot, announced);
         }
     }
 
@@ -271,39 +309,47 @@ impl<const N: usize> Group<N> {
         self.axes.get(axis).map_or(0, |axis| axis.path.room())
     }
 
-    /// The steepest slopes of what follows, rpm/s, for the ramps of the drive.
+    /// The steepest slopes of what follows, rpm/s, for the ramps of the drive, which
+    /// get room for the position loop.
+    #[inline(never)]
     pub fn set_ramps(&mut self, axis: usize, up: f32, down: f32) {
-        let config = self.config;
-        if let Some(axis) = self.axes.get_mut(axis) {
-            axis.set_ramps(up, down, config);
-        }
+        const PERCENT: f32 = 0.01;
+        let (Some(config), Some(axis)) = (self.config, self.axes.get_mut(axis)) else {
+            return;
+        };
+        let more = config.ramp_percent as f32 * PERCENT;
+        let least = config.ramp_min as f32;
+        axis.set_ramps(least.max(up * more), least.max(down * more));
     }
 
     /// A set-point of profile position mode, to be handed to the drive. `false`:
     /// the drive has not taken the last one yet, or the group is not released, or
     /// the axis is in another mode.
     pub fn ask(&mut self, axis: usize, set_point: &SetPoint) -> bool {
-        let released = self.state == GroupState::Moving;
-        let Some(axis) = self.axes.get_mut(axis) else {
+        let bit = bit(axis);
+        let config = self.config.and_then(|config| config.axes.get(axis));
+        let (Some(config), Some(axis)) = (config, self.axes.get_mut(axis)) else {
             return false;
         };
-        let can = released && axis.mode == Mode::ProfilePosition && axis.led.is_taken();
+        let can = self.state == GroupState::Moving
+            && axis.mode(config) == Mode::ProfilePosition
+            && axis.led.is_taken();
         if can {
             axis.led.ask(set_point);
-            axis.arrived = axis.absent;
+            self.busy |= bit;
         }
         can
     }
 
     /// Whether every axis has come to rest at the end of its path, and no other is
     /// announced.
-    pub fn all_arrived(&self) -> bool {
-        self.announced.is_none() && self.axes.iter().all(|axis| axis.arrived)
+    pub const fn all_arrived(&self) -> bool {
+        self.announced == 0 && self.busy & !self.absent == 0
     }
 
     /// Whether every path has reached its last knot, and no other is announced.
     pub fn all_over(&self) -> bool {
-        self.announced.is_none() && self.axes.iter().all(|axis| axis.path.is_over())
+        self.announced == 0 && self.axes.iter().all(|axis| axis.path.is_over())
     }
 
     /// The next axis whose mode has to be written and confirmed.
@@ -311,18 +357,22 @@ impl<const N: usize> Group<N> {
         if self.state != GroupState::ModeChange || self.since < TARGET_SETTLED {
             return None;
         }
+        self.next_wanted()
+    }
+
+    fn next_wanted(&self) -> Option<ModeWanted> {
         let wanted = |(axis, a): (usize, &Axis)| a.wanted.map(|mode| ModeWanted { axis, mode });
         self.axes.iter().enumerate().find_map(wanted)
     }
 
     /// 6061h of an axis shows `mode`.
     pub fn confirm_mode(&mut self, confirmed: ModeWanted) {
-        if let Some(axis) = self.axes.get_mut(confirmed.axis)
+        let config = self.config.and_then(|config| config.axes.get(confirmed.axis));
+        if let (Some(config), Some(axis)) = (config, self.axes.get_mut(confirmed.axis))
             && axis.wanted == Some(confirmed.mode)
         {
-            axis.mode = confirmed.mode;
-            axis.wanted = None;
-            axis.hold_actual();
+            axis.changed = axis.wanted.take();
+            axis.hold_actual(config);
         }
     }
 
@@ -334,46 +384,42 @@ impl<const N: usize> Group<N> {
         feedback: &[AxisFeedback; N],
         out: &mut [AxisCommand; N],
     ) {
-        self.now += self.config.cycle;
+        let Some(config) = self.config else { return };
+        self.now += config.cycle;
         self.count = self.count.wrapping_add(1);
         self.since = self.since.saturating_add(1);
         let mut cut = 0;
-        if let Some((start, axes)) = self.announced
-            && start == self.count
-        {
-            cut = axes;
-            self.announced = None;
+        if self.start == self.count {
+            cut = core::mem::take(&mut self.announced);
         }
-        for (axis, feedback) in self.axes.iter_mut().zip(feedback) {
-            if let Some(state) = axis.hear(feedback, axis.is_in(cut)) {
-                let axis = axis.n;
+        for (n, (axis, feedback)) in self.axes.iter_mut().zip(feedback).enumerate() {
+            if let Some(state) = axis.hear(feedback, self.count, cut & bit(n) != 0) {
+                let axis = n as u8;
                 self.events.report(GroupEvent::AxisState { axis, state });
             }
         }
-        self.watch(inputs);
-        self.obey(inputs);
-        self.advance();
-        let (now, state) = (self.now, self.state);
-        let halt = matches!(state, GroupState::Stopping | GroupState::Halt);
-        for (axis, out) in self.axes.iter_mut().zip(out) {
-            *out = match state {
-                _ if axis.absent => axis.command(Command::DisableVoltage),
-                GroupState::Idle | GroupState::Faulted => axis.command(Command::DisableVoltage),
-                GroupState::Enabling
-                | GroupState::Standby
-                | GroupState::ModeChange
-                | GroupState::Disabling => axis.rest(now),
-                GroupState::Moving
-                | GroupState::Stopping
-                | GroupState::Halt
-                | GroupState::Homing => axis.follow(now, false, halt),
-                // Quick stop leaves a drive that is braking by itself on its ramp
-                // and cannot enable anything.
-                GroupState::FaultStop if !axis.excluded && !axis.mode.is_led_by_drive() => {
-                    axis.follow(now, true, true)
-                }
-                GroupState::QuickStop | GroupState::FaultStop => axis.command(Command::QuickStop),
+        self.watch(inputs, config);
+        self.obey(inputs, config);
+        self.advance(config);
+        let (command, lead) = sent(self.state);
+        let axes = self.axes.iter_mut().zip(&config.axes).zip(out);
+        for (n, ((axis, config_of), out)) in axes.enumerate() {
+            let (mut command, mut led) = (command, lead.unwrap_or(Lead::Rest));
+            if self.absent & bit(n) != 0 {
+                (command, led) = (Command::DisableVoltage, Lead::Rest);
+            } else if led == Lead::Fault
+                && (self.excluded & bit(n) != 0 || axis.mode(config_of).is_led_by_drive())
+            {
+                // It leaves a drive that is braking by itself on its ramp and cannot
+                // enable anything.
+                (command, led) = (Command::QuickStop, Lead::Rest);
+            }
+            let word = if lead.is_none() && self.absent & bit(n) == 0 {
+                axis.machine.step(self.now, axis.fresh_status())
+            } else {
+                ControlWord::new(command)
             };
+            axis.command(word.0, led, config_of, &config.tuning, out);
         }
     }
 
@@ -392,20 +438,31 @@ impl<const N: usize> Group<N> {
         let from = core::mem::replace(&mut self.state, to);
         self.since = 0;
         self.events.report(GroupEvent::State { from, to });
-        self.announced = None;
+        self.announced = 0;
         match to {
             GroupState::Enabling => {
-                for axis in &mut self.axes {
-                    axis.restart(self.absent);
-                }
+                self.faulted = 0;
+                self.excluded = 0;
+                self.coasting = 0;
+                self.busy = 0;
+                self.axes.iter_mut().for_each(Axis::restart);
                 self.set_stage(Goal::Disabled);
             }
             GroupState::Disabling => self.set_stage(Goal::Disabled),
             GroupState::Stopping | GroupState::Halt => self.stop(false),
             GroupState::FaultStop => {
                 self.network_was_down = false;
-                for axis in &mut self.axes {
-                    axis.begin_fault_stop(from != GroupState::Enabling);
+                // Axes that their drives do not hold enabled are excluded; that is
+                // news only if they were.
+                self.excluded = self.absent;
+                for (n, axis) in self.axes.iter().enumerate() {
+                    if !axis.is_enabled() {
+                        self.excluded |= bit(n);
+                    }
+                }
+                self.coasting = self.absent;
+                if from == GroupState::Enabling {
+                    self.coasting = self.excluded;
                 }
                 self.stop(true);
             }
@@ -417,16 +474,25 @@ impl<const N: usize> Group<N> {
 
     /// Ramps from the next SYNC on, equally long for all axes.
     fn stop(&mut self, fault: bool) {
+        let Some(config) = self.config else { return };
         let mut speeds = [0.0; N];
         let mut fastest = 0.0f32;
-        for (speed, axis) in speeds.iter_mut().zip(&self.axes) {
-            *speed = axis.speed(fault);
-            fastest = fastest.max(speed.abs());
+        let axes = self.axes.iter().zip(&config.axes).zip(&mut speeds);
+        for (n, ((axis, config), speed)) in axes.enumerate() {
+            if (self.excluded | self.absent) & bit(n) == 0 {
+                *speed = axis.speed(fault, config);
+                fastest = fastest.max(speed.abs());
+            }
         }
-        let cycles = stop_cycles(fastest, self.config);
-        let share = 1.0 / cycles.max(1) as f32;
-        for (speed, axis) in speeds.into_iter().zip(&mut self.axes) {
-            axis.stop(cycles, share, speed, fault, self.config);
+        let cycles = stop_cycles(fastest, config).max(1);
+        for (n, speed) in speeds.into_iter().enumerate() {
+            let (Some(axis), Some(config)) = (self.axes.get_mut(n), config.axes.get(n)) else {
+                continue;
+            };
+            let slope = axis.stop(cycles, speed, config);
+            if axis.mode(config).has_position() {
+                self.set_ramps(n, slope, slope);
+            }
         }
     }
 
@@ -437,38 +503,36 @@ impl<const N: usize> Group<N> {
         }
     }
 
+    #[inline(never)]
     fn hold_actual(&mut self) {
-        for axis in &mut self.axes {
-            axis.hold_actual();
+        let Some(config) = self.config else { return };
+        for (axis, config) in self.axes.iter_mut().zip(&config.axes) {
+            axis.hold_actual(config);
         }
     }
 
     /// What goes on by itself in each state.
-    fn advance(&mut self) {
+    fn advance(&mut self, config: &GroupConfig<N>) {
         let done = match self.state {
             GroupState::Idle | GroupState::Standby | GroupState::Faulted | GroupState::Halt => {
                 false
             }
-            GroupState::Enabling | GroupState::Disabling => self.next_stage(),
+            GroupState::Enabling | GroupState::Disabling => self.next_stage(config),
             GroupState::Moving | GroupState::Homing => {
-                let arrived = self.arrive(true);
-                arrived && self.state == GroupState::Homing
+                self.arrive(true, config) && self.state == GroupState::Homing
             }
-            GroupState::Stopping => self.arrive(false),
-            GroupState::ModeChange => {
-                let change = self.axes.iter().find(|axis| axis.wanted.is_some());
-                match change.map(|axis| (axis.n, axis.wanted.unwrap_or_default())) {
-                    None => true,
-                    Some((axis, mode)) => {
-                        if self.since > self.config.cycles(self.config.enable_timeout) {
-                            let cause = FaultCause::ModeNotConfirmed { mode };
-                            self.fault(Some(axis), cause, Event::Late);
-                        }
-                        false
+            GroupState::Stopping => self.arrive(false, config),
+            GroupState::ModeChange => match self.next_wanted() {
+                None => true,
+                Some(ModeWanted { axis, mode }) => {
+                    if self.since > config.cycles(config.enable_timeout) {
+                        let cause = FaultCause::ModeNotConfirmed { mode };
+                        self.fault(Some(axis as u8), cause, Event::Late);
                     }
+                    false
                 }
-            }
-            GroupState::QuickStop | GroupState::FaultStop => self.comes_to_rest(),
+            },
+            GroupState::QuickStop | GroupState::FaultStop => self.comes_to_rest(config),
         };
         if done {
             self.happen(Event::Done);
@@ -476,12 +540,20 @@ impl<const N: usize> Group<N> {
     }
 
     /// All axes reach a state before the next transition is commanded.
-    fn next_stage(&mut self) -> bool {
-        for axis in &mut self.axes {
-            // The target is the actual position until the drive follows it.
-            axis.hold_actual();
+    fn next_stage(&mut self, config: &GroupConfig<N>) -> bool {
+        // The target is the actual position until the drive follows it.
+        self.hold_actual();
+        let (mut reached, mut rest) = (true, true);
+        for (n, axis) in self.axes.iter().enumerate() {
+            if self.absent & bit(n) == 0 {
+                let AxisFeedback {
+                    fresh, velocity, ..
+                } = axis.feedback;
+                reached &= axis.machine.reached();
+                rest &= fresh && velocity.unsigned_abs() <= config.standstill_rpm;
+            }
         }
-        if !self.axes.iter().all(|a| a.absent || a.machine.reached()) {
+        if !reached {
             return false;
         }
         let next = match self.stage {
@@ -492,14 +564,6 @@ impl<const N: usize> Group<N> {
             Goal::Enabled | Goal::QuickStop => {
                 // A drive that was switched off in motion may have been enabled
                 // before its axis stood: it brakes first.
-                let limit = self.config.standstill_rpm;
-                let rests = |axis: &Axis| {
-                    let AxisFeedback {
-                        fresh, velocity, ..
-                    } = axis.feedback;
-                    axis.absent || (fresh && velocity.unsigned_abs() <= limit)
-                };
-                let rest = self.axes.iter().all(rests);
                 for axis in self.axes.iter_mut().filter(|_| rest) {
                     axis.home = axis.feedback.position;
                 }
@@ -511,35 +575,54 @@ impl<const N: usize> Group<N> {
     }
 
     /// Whether every axis has come to rest, `on_target` or wherever it is.
-    fn arrive(&mut self, on_target: bool) -> bool {
-        let config = self.config;
-        let announced = self.announced.map_or(0, |(_, axes)| axes);
-        let mut all = announced == 0;
-        for axis in &mut self.axes {
-            if (axis.arrived && on_target) || axis.absent || axis.is_in(announced) {
+    fn arrive(&mut self, on_target: bool, config: &GroupConfig<N>) -> bool {
+        let mut all = self.announced == 0;
+        let mut waiting = !(self.absent | self.announced);
+        if on_target {
+            waiting &= self.busy;
+        }
+        let (enable, settle) = (config.enable_timeout, config.settle_timeout);
+        for (n, (axis, limits)) in self.axes.iter_mut().zip(&config.axes).enumerate() {
+            if waiting & bit(n) == 0 {
                 continue;
             }
-            match axis.comes_to_rest(on_target, config) {
-                Ok(None) => all = false,
-                Ok(Some(error)) => {
-                    axis.arrived = true;
-                    if axis.mode == Mode::Homing && on_target {
-                        axis.home = 0;
+            let mode = axis.mode(limits);
+            let near = on_target && mode.has_position();
+            let failed = if on_target && mode.is_led_by_drive() {
+                match axis.led.outcome(mode, config.cycles(enable)) {
+                    Ok(None) => {
+                        all = false;
+                        continue;
                     }
-                    if on_target {
-                        let (axis, target) = (axis.n, super::fixed::round(axis.head().position));
-                        self.events.report(GroupEvent::Arrived {
-                            axis,
-                            target,
-                            error,
-                        });
-                    }
+                    outcome => outcome.err(),
                 }
-                Err(cause) => {
-                    let axis = axis.n;
-                    self.fault(Some(axis), cause, Event::Late);
-                    return false;
+            } else if !axis.ended() {
+                all = false;
+                continue;
+            } else {
+                let most = if near { limits.in_position } else { u32::MAX };
+                let rests = axis.settle(most, config.standstill_rpm, config.settle_cycles);
+                if !rests && axis.waited() <= config.cycles(settle) {
+                    all = false;
+                    continue;
                 }
+                let error = axis.error();
+                (!rests).then_some(FaultCause::NotArrived { error })
+            };
+            if let Some(cause) = failed {
+                self.fault(Some(n as u8), cause, Event::Late);
+                return false;
+            }
+            self.busy &= !bit(n);
+            if on_target {
+                if mode == Mode::Homing {
+                    axis.home = 0;
+                }
+                self.events.report(GroupEvent::Arrived {
+                    axis: n as u8,
+                    target: axis.head(),
+                    error: if near { axis.error() } else { 0 },
+                });
             }
         }
         all
@@ -547,27 +630,36 @@ impl<const N: usize> Group<N> {
 
     /// After a quick stop or a fault: waits for standstill, for as long as an axis
     /// may take. Axes that report nothing are not waited for.
-    fn comes_to_rest(&mut self) -> bool {
-        let config = self.config;
-        let patience = config.cycles(config.settle_timeout);
-        let (mut all, mut fastest) = (true, 0);
-        for axis in &mut self.axes {
-            let silent = axis.missing >= config.missing_tpdo_max;
-            let rests = axis.absent || (axis.path.is_over() && axis.settle(None, config));
-            all &= rests || silent;
-            fastest = fastest.max(axis.config.velocity_max);
+    fn comes_to_rest(&mut self, config: &GroupConfig<N>) -> bool {
+        let mut moving = 0;
+        for (n, axis) in self.axes.iter_mut().enumerate() {
+            let rests = axis.path.is_over()
+                && axis.settle(u32::MAX, config.standstill_rpm, config.settle_cycles);
+            if !rests && self.absent & bit(n) == 0 && axis.missing < config.missing_tpdo_max {
+                moving |= bit(n);
+            }
         }
-        if !all && self.since > patience.saturating_add(stop_cycles(fastest as f32, config)) {
-            for axis in &mut self.axes {
-                if !axis.absent && !axis.settle(None, config) {
+        let fastest = |most: u32, axis: &AxisConfig| most.max(axis.velocity_max);
+        let fastest = config.axes.iter().fold(0, fastest);
+        let patience = config.cycles(config.settle_timeout) + stop_cycles(fastest as f32, config);
+        if moving != 0 && self.since > patience {
+            for (n, axis) in self.axes.iter().enumerate() {
+                if moving & bit(n) != 0 {
                     self.events.report(GroupEvent::NotAtRest {
-                        axis: axis.n,
+                        axis: n as u8,
                         velocity: axis.feedback.velocity,
                     });
                 }
             }
             self.happen(Event::Late);
         }
-        all
+        moving == 0
     }
+}
+
+/// Whole cycles to come from `rpm` to rest.
+fn stop_cycles<const N: usize>(rpm: f32, group: &GroupConfig<N>) -> u32 {
+    const SECOND_US: f32 = 1e6;
+    let per_cycle = group.stop_deceleration as f32 * (group.cycle.as_micros() as f32 / SECOND_US);
+    fixed::ceil(rpm.abs() / per_cycle)
 }

@@ -1,10 +1,9 @@
 //! Orders to the group, judged at once and carried out in the next step.
 
-use super::axis::Axis;
-use super::{Group, Inputs};
+use super::{Group, Inputs, bit};
 use crate::motion::contract::{Cell, Event, cell};
 use crate::motion::mode::Mode;
-use crate::motion::{AxisFeedback, GroupEvent, GroupState, Refusal};
+use crate::motion::{AxisFeedback, GroupConfig, GroupEvent, GroupState, Refusal};
 
 /// What the group is told to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,20 +63,15 @@ impl<const N: usize> Group<N> {
     /// # Errors
     /// [`Refusal`]: nothing is done.
     pub fn order(&mut self, order: Order) -> Result<(), Refusal> {
-        match order {
-            Order::Enable => {
-                self.wanted = true;
-                return Ok(());
-            }
-            Order::Disable => {
-                self.wanted = false;
-                return Ok(());
-            }
-            _ => {}
+        let Some(event) = order.event() else {
+            self.unwanted = false;
+            return Ok(());
+        };
+        if event == Event::Disable {
+            self.unwanted = true;
+            return Ok(());
         }
-        if let Some(event) = order.event()
-            && cell(self.state, event) == Cell::Refuse
-        {
+        if cell(self.state, event) == Cell::Refuse {
             return Err(Refusal::NotIn(self.state));
         }
         match order {
@@ -85,59 +79,60 @@ impl<const N: usize> Group<N> {
                 return Err(Refusal::Busy);
             }
             Order::Stop | Order::QuickStop => {}
-            _ if self.ordered.is_some() => return Err(Refusal::Busy),
-            _ => self
-                .axes
-                .iter()
-                .try_for_each(|axis| self.permit(order, axis))?,
+            _ if self.ordered != Order::Enable => return Err(Refusal::Busy),
+            _ => self.permit(order)?,
         }
-        if matches!(order, Order::QuickStop) {
-            self.wanted = false;
-        }
-        self.ordered = Some(order);
+        self.unwanted |= order == Order::QuickStop;
+        self.ordered = order;
         Ok(())
     }
 
-    /// Whether an axis can do what is ordered.
-    fn permit(&self, order: Order, axis: &Axis) -> Result<(), Refusal> {
-        let AxisFeedback {
-            velocity, fresh, ..
-        } = axis.feedback;
-        let (n, mode) = (axis.n, axis.mode);
-        match order {
-            _ if axis.absent => {}
-            Order::Reset if !self.network_ready => return Err(Refusal::NetworkNotReady),
-            Order::Release | Order::SetMode { .. } if !fresh => {
-                return Err(Refusal::NotFresh { axis: n });
+    /// Whether all axes can do what is ordered.
+    fn permit(&self, order: Order) -> Result<(), Refusal> {
+        let Some(config) = self.config else {
+            return Err(Refusal::NetworkNotReady);
+        };
+        if order == Order::Reset && !self.network_ready {
+            return Err(Refusal::NetworkNotReady);
+        }
+        for (n, (axis, limits)) in self.axes.iter().zip(&config.axes).enumerate() {
+            if self.absent & bit(n) != 0 {
+                continue;
             }
-            Order::Release | Order::SetMode { .. }
-                if velocity.unsigned_abs() > self.config.standstill_rpm =>
-            {
-                return Err(Refusal::NotAtRest { axis: n, velocity });
-            }
-            Order::Home { axes, .. } if axis.is_in(axes) && mode != Mode::Homing => {
-                return Err(Refusal::WrongMode { axis: n, mode });
-            }
-            Order::SetMode { axes, mode } if axis.is_in(axes) && !mode.is_in(axis.config.modes) => {
-                return Err(Refusal::ModeNotSupported {
-                    axis: n,
-                    mode,
-                    supported: axis.config.modes,
-                });
-            }
-            _ => {}
+            let AxisFeedback {
+                velocity, fresh, ..
+            } = axis.feedback;
+            let moves = velocity.unsigned_abs() > config.standstill_rpm;
+            let (mode, supported) = (axis.mode(limits), limits.modes);
+            let axis = n as u8;
+            let refusal = match order {
+                Order::Release | Order::SetMode { .. } if !fresh => Refusal::NotFresh { axis },
+                Order::Release | Order::SetMode { .. } if moves => {
+                    Refusal::NotAtRest { axis, velocity }
+                }
+                Order::Home { axes, .. } if axes & bit(n) != 0 && mode != Mode::Homing => {
+                    Refusal::WrongMode { axis, mode }
+                }
+                Order::SetMode { axes, mode } if axes & bit(n) != 0 && !mode.is_in(supported) => {
+                    Refusal::ModeNotSupported {
+                        axis,
+                        mode,
+                        supported,
+                    }
+                }
+                _ => continue,
+            };
+            return Err(refusal);
         }
         Ok(())
     }
 
     /// The network, and what was ordered.
-    pub(super) fn obey(&mut self, inputs: &Inputs) {
+    pub(super) fn obey(&mut self, inputs: &Inputs, config: &GroupConfig<N>) {
         let ready = inputs.network_ready;
         self.network_ready = ready;
-        let left_out = |axis: &Axis| axis.faulted && axis.is_in(inputs.absent);
-        self.network_was_down |= !ready || self.axes.iter().any(left_out);
+        self.network_was_down |= !ready || self.faulted & inputs.absent != 0;
         let waits = self.state == GroupState::Faulted && !self.network_was_down;
-        let ordered = self.ordered.take();
         if inputs.absent != self.absent
             && matches!(
                 self.state,
@@ -147,14 +142,13 @@ impl<const N: usize> Group<N> {
             self.absent = inputs.absent;
             self.happen(Event::AxesChanged);
         }
-        if !self.wanted {
+        if self.unwanted {
             self.happen(Event::Disable);
         } else if ready && !waits {
             self.happen(Event::Ready);
         }
-        let Some((order, event)) = ordered.and_then(|order| Some((order, order.event()?))) else {
-            return;
-        };
+        let order = core::mem::replace(&mut self.ordered, Order::Enable);
+        let Some(event) = order.event() else { return };
         let before = self.state;
         if !self.happen(event) {
             // Something came in between.
@@ -162,31 +156,36 @@ impl<const N: usize> Group<N> {
             self.events.report(GroupEvent::ReleaseRefused(why));
             return;
         }
-        self.carry_out(order);
+        self.carry_out(order, config);
     }
 
     /// What a transition needs to know of its order.
-    fn carry_out(&mut self, order: Order) {
-        match (order, self.state) {
+    fn carry_out(&mut self, order: Order, config: &GroupConfig<N>) {
+        let of = match (order, self.state) {
             (Order::Release, GroupState::Moving) => {
                 self.hold_actual();
-                for axis in &mut self.axes {
-                    axis.arrived = true;
-                }
+                self.busy = 0;
+                return;
             }
-            (Order::Home { axes, limit }, GroupState::Homing) => {
-                for axis in self.axes.iter_mut().filter(|axis| axis.is_in(axes)) {
+            (Order::Home { axes, .. }, GroupState::Homing)
+            | (Order::SetMode { axes, .. }, GroupState::ModeChange) => axes & !self.absent,
+            _ => return,
+        };
+        for (n, (axis, limits)) in self.axes.iter_mut().zip(&config.axes).enumerate() {
+            if of & bit(n) == 0 {
+                continue;
+            }
+            match order {
+                Order::Home { limit, .. } => {
                     axis.led.home(limit);
-                    axis.arrived = axis.absent;
+                    self.busy |= bit(n);
                 }
-            }
-            (Order::SetMode { axes, mode }, GroupState::ModeChange) => {
-                for axis in self.axes.iter_mut().filter(|axis| axis.is_in(axes)) {
-                    axis.wanted = (axis.mode != mode && !axis.absent).then_some(mode);
-                    axis.hold_actual();
+                Order::SetMode { mode, .. } => {
+                    axis.wanted = (axis.mode(limits) != mode).then_some(mode);
+                    axis.hold_actual(limits);
                 }
+                _ => {}
             }
-            _ => {}
         }
     }
 }

@@ -1,14 +1,13 @@
 //! Supervision: what stops the group.
 
-use super::axis::Axis;
-use super::{Event, Group, Inputs};
+use super::{Event, Group, Inputs, bit};
 use crate::cia402::{Goal, StatusWord};
 use crate::motion::mode::Mode;
-use crate::motion::{FaultCause, GroupEvent, GroupState};
+use crate::motion::{FaultCause, GroupConfig, GroupEvent, GroupState};
 
 impl<const N: usize> Group<N> {
     /// Looks for faults in what was told and reported in this step.
-    pub(super) fn watch(&mut self, inputs: &Inputs) {
+    pub(super) fn watch(&mut self, inputs: &Inputs, config: &GroupConfig<N>) {
         if let Some((axis, cause)) = inputs.fault {
             self.fault(u8::try_from(axis).ok(), cause, Event::Fault);
         }
@@ -21,21 +20,11 @@ impl<const N: usize> Group<N> {
             }
             _ => {}
         }
-        for n in 0..self.axes.len() {
-            if let Some(axis) = self.axes.get_mut(n)
-                && !axis.absent
+        for n in 0..N {
+            if self.absent & bit(n) == 0
+                && let Some(cause) = self.find_fault(n, state, inputs, config)
             {
-                let led = match state {
-                    GroupState::Moving | GroupState::Homing if axis.mode.is_led_by_drive() => {
-                        axis.led.hear(axis.mode, axis.fresh_status()).err()
-                    }
-                    _ => None,
-                };
-                let n = axis.n;
-                if let Some(cause) = led.or_else(|| self.find_fault(usize::from(n), state, inputs))
-                {
-                    self.fault(Some(n), cause, Event::Fault);
-                }
+                self.fault(Some(n as u8), cause, Event::Fault);
             }
         }
         if self.state == GroupState::FaultStop {
@@ -45,26 +34,40 @@ impl<const N: usize> Group<N> {
 
     /// A fault of an axis that was not reported yet, in the state that the
     /// group had at the beginning of the step.
-    fn find_fault(&self, n: usize, state: GroupState, inputs: &Inputs) -> Option<FaultCause> {
-        let axis: &Axis = self.axes.get(n)?;
-        let feedback = &axis.feedback;
-        if inputs.network_ready && axis.is_in(inputs.absent) && !axis.faulted {
+    fn find_fault(
+        &mut self,
+        n: usize,
+        state: GroupState,
+        inputs: &Inputs,
+        config: &GroupConfig<N>,
+    ) -> Option<FaultCause> {
+        let (axis, limits) = (self.axes.get_mut(n)?, config.axes.get(n)?);
+        let faulted = self.faulted & bit(n) != 0;
+        let mode = axis.mode(limits);
+        let by_drive = mode.is_led_by_drive();
+        if by_drive
+            && matches!(state, GroupState::Moving | GroupState::Homing)
+            && let Err(cause) = axis.led.hear(mode, axis.fresh_status())
+        {
+            return Some(cause);
+        }
+        if !faulted && inputs.network_ready && inputs.absent & bit(n) != 0 {
             return Some(FaultCause::LeftOperational);
         }
-        if axis.missing >= self.config.missing_tpdo_max && !axis.faulted {
-            return Some(FaultCause::TpdoMissing {
-                cycles: axis.missing,
-            });
+        let cycles = axis.missing;
+        if !faulted && cycles >= config.missing_tpdo_max {
+            return Some(FaultCause::TpdoMissing { cycles });
         }
         let leads = matches!(state, GroupState::Enabling | GroupState::Disabling);
-        if leads && let Err(timeout) = axis.machine.check(self.now) {
+        if leads && let Err(timeout) = axis.machine.check(self.now, config.enable_timeout) {
             return Some(FaultCause::NotEnabled(timeout));
         }
-        if !feedback.fresh || (state == GroupState::FaultStop && axis.excluded) {
+        let stops = state == GroupState::FaultStop;
+        if !axis.feedback.fresh || (stops && self.excluded & bit(n) != 0) {
             return None;
         }
-        let status = StatusWord(feedback.statusword);
-        if status.state().is_fault() {
+        let status = StatusWord(axis.feedback.statusword);
+        if status.is_fault() {
             // The first stage of enabling resets the faults of the past.
             let reset = leads && self.stage == Goal::Disabled;
             return (!reset).then_some(FaultCause::DriveFault { status });
@@ -72,25 +75,19 @@ impl<const N: usize> Group<N> {
         if leads || state == GroupState::QuickStop {
             return None;
         }
-        let braking = state == GroupState::FaultStop && axis.mode.is_led_by_drive();
-        if !status.state().is_enabled() && !braking {
+        if !(status.is_enabled() || (stops && by_drive)) {
             return Some(FaultCause::LeftEnabled { status });
         }
-        if self.state == GroupState::FaultStop {
+        if self.state == GroupState::FaultStop || axis.wanted.is_some() {
             return None;
         }
-        if axis.wanted.is_some() {
-            return None;
-        }
-        let reports = matches!(axis.mode, Mode::CyclicPosition | Mode::ProfilePosition);
+        let reports = matches!(mode, Mode::CyclicPosition | Mode::ProfilePosition);
         if reports && status.mode_bit_13() {
             return Some(FaultCause::DriveError { status });
         }
-        if axis.mode.has_position() {
-            let (allowed, error) = (axis.config.following_error_max, axis.error());
-            if error.unsigned_abs() > allowed {
-                return Some(FaultCause::FollowingError { error, allowed });
-            }
+        let (allowed, error) = (limits.following_error_max, axis.error());
+        if mode.has_position() && error.unsigned_abs() > allowed {
+            return Some(FaultCause::FollowingError { error, allowed });
         }
         axis.path.is_dry().then_some(FaultCause::PathDry)
     }
@@ -100,8 +97,8 @@ impl<const N: usize> Group<N> {
     #[inline(never)]
     pub(super) fn fault(&mut self, axis: Option<u8>, cause: FaultCause, event: Event) {
         self.events.report(GroupEvent::Fault { axis, cause });
-        if let Some(axis) = axis.and_then(|n| self.axes.get_mut(usize::from(n))) {
-            axis.faulted = true;
+        if let Some(n) = axis {
+            self.faulted |= bit(n.into());
         }
         if self.state != GroupState::FaultStop {
             self.happen(event);
@@ -110,12 +107,12 @@ impl<const N: usize> Group<N> {
 
     /// Axes whose drives have left operation enabled, each reported once.
     fn exclude_lost_axes(&mut self) {
-        for axis in &mut self.axes {
+        for (n, axis) in self.axes.iter().enumerate() {
             let Some(state) = axis.state() else { continue };
-            if !state.is_enabled() && !axis.coasting {
-                axis.coasting = true;
-                axis.excluded = true;
-                let axis = axis.n;
+            if !state.is_enabled() && self.coasting & bit(n) == 0 {
+                self.coasting |= bit(n);
+                self.excluded |= bit(n);
+                let axis = n as u8;
                 self.events.report(GroupEvent::Coasting { axis, state });
             }
         }
