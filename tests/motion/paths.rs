@@ -254,7 +254,7 @@ fn the_announced_path_takes_over_in_its_step() {
     for _ in 0..50 {
         path.advance();
     }
-    let mut ahead = path.clone();
+    let mut ahead = path;
     let from = (0..3).map(|_| ahead.advance()).last().unwrap();
     let back = Leg {
         from,

@@ -111,12 +111,7 @@ impl Axis {
     /// Takes in this cycle's feedback and goes one cycle on; returns the state of
     /// the drive if it is another one than last reported.
     #[inline(never)]
-    pub(super) fn hear(
-        &mut self,
-        feedback: &AxisFeedback,
-        count: u32,
-        cut: bool,
-    ) -> Option<State> {
+    pub(super) fn hear(&mut self, feedback: &AxisFeedback, count: u32, cut: bool) -> Option<State> {
         self.count = count;
         if cut {
             self.path.cut();

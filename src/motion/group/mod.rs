@@ -280,7 +280,8 @@ impl<const N: usize> Group<N> {
     pub fn announce(&mut self, start: u32, axes: u32) -> Result<(), TooLate> {
         const FAR: u32 = 1 << 8;
         let left = start.wrapping_sub(self.count);
-        let fits = |(n, axis): (usize, &Axis)| axes & bit(n) == 0 || axis.path.can_be_replaced(left);
+        let fits =
+            |(n, axis): (usize, &Axis)| axes & bit(n) == 0 || axis.path.can_be_replaced(left);
         let fit = self.axes.iter().enumerate().all(fits);
         if left == 0 || left > FAR || self.state != GroupState::Moving || !fit {
             return Err(TooLate);
@@ -367,7 +368,9 @@ impl<const N: usize> Group<N> {
 
     /// 6061h of an axis shows `mode`.
     pub fn confirm_mode(&mut self, confirmed: ModeWanted) {
-        let config = self.config.and_then(|config| config.axes.get(confirmed.axis));
+        let config = self
+            .config
+            .and_then(|config| config.axes.get(confirmed.axis));
         if let (Some(config), Some(axis)) = (config, self.axes.get_mut(confirmed.axis))
             && axis.wanted == Some(confirmed.mode)
         {
