@@ -48,12 +48,18 @@ pub const CONTROLWORD: Address = Address::new(0x6040, 0);
 pub const STATUSWORD: Address = Address::new(0x6041, 0);
 /// Modes of operation (CiA 402), I8.
 pub const MODES_OF_OPERATION: Address = Address::new(0x6060, 0);
+/// Modes of operation display (CiA 402), I8.
+pub const MODES_OF_OPERATION_DISPLAY: Address = Address::new(0x6061, 0);
 /// Position actual value (CiA 402), I32 in increments.
 pub const POSITION_ACTUAL: Address = Address::new(0x6064, 0);
 /// Velocity actual value (CiA 402), I32 in velocity units.
 pub const VELOCITY_ACTUAL: Address = Address::new(0x606C, 0);
+/// Target torque (CiA 402), I16 in per mille of the rated torque.
+pub const TARGET_TORQUE: Address = Address::new(0x6071, 0);
 /// Torque actual value (CiA 402), I16 in per mille of the rated torque.
 pub const TORQUE_ACTUAL: Address = Address::new(0x6077, 0);
+/// Target position (CiA 402), I32 in increments.
+pub const TARGET_POSITION: Address = Address::new(0x607A, 0);
 /// Max profile velocity (CiA 402), U32.
 pub const MAX_PROFILE_VELOCITY: Address = Address::new(0x607F, 0);
 /// Max motor speed (CiA 402), U32.

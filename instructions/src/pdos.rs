@@ -60,7 +60,7 @@ pub(crate) fn feedback(times: u32) {
     }
 }
 
-/// The objects of one axis, and its RPDO1.
+/// The RPDO of one axis in a cycle.
 pub(crate) fn rpdo(times: u32) {
     let [pdos, ..] = &PDOS;
     let command = AxisCommand {
@@ -71,7 +71,6 @@ pub(crate) fn rpdo(times: u32) {
         deceleration: 1500,
     };
     for _ in 0..times {
-        let image = black_box(pdos).image(black_box(&command));
-        black_box(pdos.rpdo(black_box(0), NODE, black_box(&image)));
+        black_box(black_box(pdos).cyclic(black_box(&command), NODE));
     }
 }

@@ -119,6 +119,8 @@ pub struct Node {
     pub increments_per_turn: Option<u32>,
     /// Turns of the motor for turns of the load.
     pub gear: (u32, u32),
+    /// 6502h as the EDS has it; `None`: it says nothing.
+    pub supported_modes: Option<u32>,
     /// Start values in their order.
     pub start_values: Vec<Write>,
 }
@@ -137,6 +139,8 @@ pub struct Motor {
     pub max_acceleration: u32,
     /// No farther from home than these, in increments: the lower, the upper.
     pub limits: (i32, i32),
+    /// Modes of operation that the drive has, and whose RPDO is mapped, as 6502h.
+    pub modes: u32,
 }
 
 /// Objects of CiA 402 that limit an axis.
@@ -148,6 +152,16 @@ const MAX_POSITION: Address = Address::new(0x607D, 2);
 /// What is not limited is a number that the firmware can still count with.
 const UNLIMITED: u32 = i32::MAX as u32;
 const ANYWHERE: (i32, i32) = (-i32::MAX, i32::MAX);
+const CONTROLWORD: u16 = 0x6040;
+const RAMPS: [u16; 2] = [0x6083, 0x6084];
+/// The target of each mode, and the modes that it is of, as 6502h has them: profile
+/// velocity, homing and cyclic synchronous velocity; profile position and cyclic
+/// synchronous position; cyclic synchronous torque.
+const TARGETS: [(u16, u32); 3] = [
+    (0x60FF, 1 << 2 | 1 << 5 | 1 << 8),
+    (0x607A, 1 << 0 | 1 << 7),
+    (0x6071, 1 << 9),
+];
 
 impl Node {
     /// Its motor, within the limits that are written to the drive. `None`
@@ -171,7 +185,19 @@ impl Node {
             max_speed: least(&[MAX_PROFILE_VELOCITY, MAX_MOTOR_SPEED]),
             max_acceleration: least(&[MAX_ACCELERATION]),
             limits,
+            modes: self.modes(),
         })
+    }
+
+    /// Modes of operation that the drive has, as far as the EDS says, and whose
+    /// target an RPDO carries, as 6502h.
+    pub fn modes(&self) -> u32 {
+        let mapped = TARGETS.iter().filter(|(target, _)| {
+            let mut rpdos = self.rpdos.iter();
+            rpdos.any(|pdo| pdo.carries(CONTROLWORD) && pdo.carries(*target))
+        });
+        let mapped = mapped.fold(0, |all, (_, modes)| all | modes);
+        self.supported_modes.unwrap_or(u32::MAX) & mapped
     }
 }
 
@@ -223,8 +249,22 @@ impl Pdo {
     /// Whether it carries a controlword or a target: what the master works out
     /// from the TPDOs of the cycle.
     pub fn answers_to_tpdos(&self) -> bool {
-        let mut indices = self.mapping.iter().map(|entry| entry.at.index);
-        indices.any(|index| ANSWERS_TO_TPDOS.contains(&index))
+        ANSWERS_TO_TPDOS.iter().any(|index| self.carries(*index))
+    }
+
+    /// Whether it is one of those of which only that of the active mode is sent in a
+    /// cycle: it carries a controlword.
+    pub fn is_of_a_mode(&self) -> bool {
+        self.carries(CONTROLWORD)
+    }
+
+    /// Whether it carries an acceleration or a deceleration of CiA 402.
+    pub fn has_ramps(&self) -> bool {
+        RAMPS.iter().any(|index| self.carries(*index))
+    }
+
+    fn carries(&self, index: u16) -> bool {
+        self.mapping.iter().any(|entry| entry.at.index == index)
     }
 
     /// Its identifier at a node (CiA 301, 7.3.5).

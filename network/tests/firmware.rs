@@ -54,9 +54,42 @@ fn what_an_axis_needs_is_mapped_once() {
 fn an_rpdo_carries_what_the_firmware_writes() {
     says(
         r#"map = ["Profile acceleration", "Profile deceleration"]"#,
-        r#"map = ["Profile acceleration", "Target torque"]"#,
+        r#"map = ["Profile acceleration", "Profile velocity"]"#,
         &["nothing to write there, and it is in RPDO2"],
     );
+    says(
+        r#"map = ["Profile acceleration", "Profile deceleration"]"#,
+        r#"map = ["Profile acceleration", "Target torque"]"#,
+        &[
+            "`RPDO2`",
+            "one of its pairs",
+            "\"Controlword\" and \"Target torque\"",
+        ],
+    );
+    says(
+        r#"map = ["Controlword", "Target torque"]"#,
+        r#"map = ["Controlword", "Target position"]"#,
+        &["`607Ah:00 \"Target position\"`", "map it once"],
+    );
+}
+
+/// What is not mapped is a mode that the drive does not have.
+#[test]
+fn modes_without_their_rpdo() {
+    let modes = |text: &str| {
+        let source = Source::new("network.toml", text.as_bytes());
+        let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let outcome = read_for_firmware(&source, &mut |file| std::fs::read(workspace.join(file)));
+        outcome.machine.unwrap().nodes[0].motor().unwrap().modes
+    };
+    let sample = sample();
+    assert_eq!(modes(&sample), 0x3A5);
+    let torque = "[device.epos4.rpdo.4]\nmap = [\"Controlword\", \"Target torque\"]\n";
+    assert!(sample.contains(torque));
+    assert_eq!(modes(&sample.replace(torque, "")), 0x1A5);
+    let position = "[device.epos4.rpdo.3]\nmap = [\"Controlword\", \"Target position\"]\n";
+    let velocity = sample.replace(torque, "").replace(position, "");
+    assert_eq!(modes(&velocity), 0x124);
 }
 
 #[test]
@@ -66,7 +99,7 @@ fn pdos_are_the_first_two_at_every_sync() {
         "[device.epos4.tpdo.3]",
         &[
             "`TPDO3`",
-            "the firmware exchanges TPDO1 and TPDO2 with an axis",
+            "the firmware takes in TPDO1 and TPDO2 of an axis",
         ],
     );
     says("transmission = 1", "transmission = 2", &["at every SYNC"]);
@@ -160,6 +193,6 @@ fn controlword_and_target_go_in_every_cycle() {
     says(
         "map = [\"Controlword\", \"Target velocity\"]",
         "send = \"on change\"\nmap = [\"Controlword\", \"Target velocity\"]",
-        &["`RPDO1`", "controlword and target velocity in every cycle"],
+        &["`RPDO1`", "controlword and target in every cycle"],
     );
 }

@@ -122,7 +122,8 @@ pub trait Board {
     /// The bytes of a TPDO of a node as it last came, zeros before.
     fn tpdo(&mut self, node: NodeId, number: u8) -> [u8; MAX_DATA];
 
-    /// The bytes of an RPDO of a node as it was last sent, zeros before.
+    /// The bytes of an RPDO of a node as it was last sent, zeros before, and while
+    /// another is sent in its place.
     fn rpdo(&mut self, node: NodeId, number: u8) -> [u8; MAX_DATA];
 }
 

@@ -31,11 +31,12 @@ const ASKS: bool = {
     asks
 };
 
-fn request(command: u8, at: Address, node: NodeId) -> Frame {
+/// A request of one frame, with a value of one byte.
+pub(crate) fn request(command: u8, at: Address, node: NodeId, value: u8) -> Frame {
     let [low, high] = at.index.0.to_le_bytes();
     Frame::full(
         CobId::of(FunctionCode::SdoRequest, node),
-        [command, low, high, at.sub.0, 0, 0, 0, 0],
+        [command, low, high, at.sub.0, value, 0, 0, 0],
     )
 }
 
@@ -49,7 +50,7 @@ pub(crate) fn is_watched(axis: usize) -> bool {
 /// not to have one there.
 pub(crate) fn quieten(node: NodeId) -> Option<Frame> {
     let (axis, _) = NETWORK.find(node)?;
-    let frame = request(DOWNLOAD_U16, objects::PRODUCER_HEARTBEAT, node);
+    let frame = request(DOWNLOAD_U16, objects::PRODUCER_HEARTBEAT, node, 0);
     (!is_watched(axis)).then_some(frame)
 }
 
@@ -87,7 +88,7 @@ impl Asking {
                     && operational & 1 << axis != 0
                     && let Some(node) = NETWORK.nodes.get(axis)
                 {
-                    let frame = request(UPLOAD, objects::ERROR_REGISTER, node.id);
+                    let frame = request(UPLOAD, objects::ERROR_REGISTER, node.id, 0);
                     lines::send(lines, frame, 1);
                     break;
                 }

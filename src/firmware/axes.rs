@@ -7,7 +7,7 @@ use crate::{
 };
 use canmaster::{
     cia402::StatusWord,
-    master::{Cycle, MasterOd, Ramps, TPDOS_PER_AXIS, TpdoSlot},
+    master::{Cycle, MasterOd, Ramps, TpdoSlot},
     motion::{
         AxisCommand, AxisFeedback, Group, GroupEvent, GroupState, Inputs, Order, Speedometer,
     },
@@ -128,27 +128,28 @@ impl Axes {
         let due = self.ramps.due(&self.commands);
         let nodes = self.network.nodes.iter().zip(&PDOS);
         for (axis, ((node, pdos), command)) in nodes.zip(&self.commands).enumerate() {
-            let image = pdos.image(command);
-            for number in 0..TPDOS_PER_AXIS as u8 {
-                let ramps = pdos.has_only_ramps(number);
-                let on_change = ramps && RAMPS_ON_CHANGE.get(axis).is_some_and(|on| *on);
-                if on_change && due != Some(axis) {
-                    continue;
-                }
-                let Some(frame) = pdos.rpdo(number, node.id, &image) else {
-                    continue;
+            let on_change = RAMPS_ON_CHANGE.get(axis).is_some_and(|on| *on);
+            let ramps = match on_change && due != Some(axis) {
+                true => None,
+                false => pdos.ramps(command, node.id),
+            };
+            let cyclic = pdos.cyclic(command, node.id);
+            lines.lock(|lines| {
+                let bus = AXIS_BUSES.get(axis).map(|bus| usize::from(*bus));
+                let Some(line) = bus.and_then(|bus| lines.get_mut(bus)) else {
+                    return;
                 };
-                lines.lock(|lines| {
-                    let bus = AXIS_BUSES.get(axis).map(|bus| usize::from(*bus));
-                    if let Some(line) = bus.and_then(|bus| lines.get_mut(bus)) {
-                        if on_change {
-                            line.on_change(frame);
-                        } else {
-                            line.cyclic(frame, ramps || RPDOS_AFTER_SYNC);
-                        }
+                if let Some(frame) = cyclic {
+                    line.cyclic(frame, RPDOS_AFTER_SYNC);
+                }
+                if let Some(frame) = ramps {
+                    if on_change {
+                        line.on_change(frame);
+                    } else {
+                        line.cyclic(frame, true);
                     }
-                });
-            }
+                }
+            });
         }
     }
 }

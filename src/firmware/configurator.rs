@@ -6,6 +6,7 @@ use crate::{
     derived::PROGRAM,
     duties::Silent,
     log::{self, Log},
+    modes::Modes,
     roll::{self, Task},
     transfer::{self, Transfer},
     wake,
@@ -27,6 +28,7 @@ pub(crate) struct Configurator<'a> {
     pub(crate) log: Log,
     silent: Silent,
     transfer: Option<Transfer>,
+    modes: Modes,
 }
 
 impl<'a> Configurator<'a> {
@@ -49,6 +51,7 @@ impl<'a> Configurator<'a> {
             log: Log::new(NETWORK),
             silent: Silent::default(),
             transfer: None,
+            modes: Modes::NONE,
         };
         for setting in [
             Setting::SyncOverflow,
@@ -83,6 +86,7 @@ impl<'a> Configurator<'a> {
         // A board that is stopped has neither SDO nor SYNC: the boot-up waits.
         let held = self.local.own.device.state() == State::Stopped && !bus_off;
         self.boot(held);
+        self.change_modes();
         roll::check_in(Task::SdoConfigurator);
         let boots = self.local.boot.next_deadline().filter(|_| !held);
         let mut next = self.now() + design::CONFIGURATOR_PERIOD;
@@ -159,7 +163,26 @@ impl<'a> Configurator<'a> {
             };
             // It leaves the answers of SDO servers alone.
             self.local.own.error_control(&frame);
-            self.local.boot.on_frame(&frame, self.now());
+            let now = self.now();
+            if !self.modes.on_frame(&frame, now) {
+                self.local.boot.on_frame(&frame, now);
+            }
+        }
+    }
+
+    /// Writes 6060h where the group wants another mode of operation, and tells it when
+    /// 6061h shows it.
+    fn change_modes(&mut self) {
+        let confirmed = self.modes.take_confirmed();
+        let wanted = self.shared.axes.lock(|axes| {
+            if let Some(confirmed) = confirmed {
+                axes.group.confirm_mode(confirmed);
+            }
+            axes.group.mode_wanted()
+        });
+        let now = self.now();
+        if let Some(frame) = self.modes.poll(wanted, now) {
+            self.send(frame);
         }
     }
 

@@ -142,7 +142,7 @@ impl Configurator<'_> {
 
     /// Queues a frame. A full queue counts it: an SDO request is repeated, by us
     /// or by the client.
-    fn send(&mut self, frame: Frame) {
+    pub(crate) fn send(&mut self, frame: Frame) {
         lines::send(&mut self.shared.lines, frame, usize::MAX);
     }
 

@@ -121,11 +121,11 @@ where
     }
 
     fn rpdo(&mut self, node: NodeId, number: u8) -> [u8; 8] {
-        let image = self.network.find(node).and_then(|(axis, _)| {
+        let data = self.network.find(node).and_then(|(axis, _)| {
             let command = self.commands.lock(|commands| commands.get(axis).copied())?;
-            Some(PDOS.get(axis)?.image(&command))
+            Some(PDOS.get(axis)?.rpdo(number, &command))
         });
-        pdo(&image.unwrap_or([0; IMAGE_BYTES]), number)
+        data.unwrap_or_default()
     }
 }
 

@@ -1,21 +1,21 @@
-//! The PDOs of an axis as this master exchanges them every cycle: where in RPDO1,
-//! RPDO2, TPDO1 and TPDO2 each object lies follows from the network's mapping.
+//! The PDOs of an axis as this master exchanges them: in which RPDO the target of
+//! each mode lies, and where in TPDO1 and TPDO2 what is reported, follows from the
+//! network's mapping.
 //!
 //! | direction | objects |
 //! |---|---|
-//! | to the drive | controlword 6040h, target velocity 60FFh, profile acceleration 6083h, profile deceleration 6084h |
+//! | to the drive, one of them per cycle | controlword 6040h and target velocity 60FFh, target position 607Ah or target torque 6071h |
+//! | to the drive, on change or per cycle | profile acceleration 6083h, profile deceleration 6084h |
 //! | from the drive | statusword 6041h, position 6064h; velocity 606Ch and torque 6077h may be left out |
 
 use super::od::{IMAGE_BYTES, TPDOS_PER_AXIS};
 use crate::frame::{Frame, MAX_DATA};
 use crate::id::{Address, CobId, FunctionCode, NodeId};
+use crate::motion::mode::Mode;
 use crate::motion::{AxisCommand, AxisFeedback};
 use crate::network::{Network, Node, Pdo};
 use crate::objects;
 use crate::pdo::MappingEntry;
-
-/// PDOs of each direction.
-const PDOS: usize = TPDOS_PER_AXIS;
 
 const fn entry(at: Address, bits: u8) -> MappingEntry {
     MappingEntry::new(at.index.0, at.sub.0, bits)
@@ -23,6 +23,8 @@ const fn entry(at: Address, bits: u8) -> MappingEntry {
 
 const CONTROLWORD: MappingEntry = entry(objects::CONTROLWORD, 16);
 const TARGET_VELOCITY: MappingEntry = entry(objects::TARGET_VELOCITY, 32);
+const TARGET_POSITION: MappingEntry = entry(objects::TARGET_POSITION, 32);
+const TARGET_TORQUE: MappingEntry = entry(objects::TARGET_TORQUE, 16);
 const ACCELERATION: MappingEntry = entry(objects::PROFILE_ACCELERATION, 32);
 const DECELERATION: MappingEntry = entry(objects::PROFILE_DECELERATION, 32);
 const STATUSWORD: MappingEntry = entry(objects::STATUSWORD, 16);
@@ -30,30 +32,47 @@ const POSITION: MappingEntry = entry(objects::POSITION_ACTUAL, 32);
 const VELOCITY: MappingEntry = entry(objects::VELOCITY_ACTUAL, 32);
 const TORQUE: MappingEntry = entry(objects::TORQUE_ACTUAL, 16);
 
-/// Where an object lies: from which byte of the PDOs on, put one behind the other
-/// with eight each.
+/// The byte at which an object begins in the mapping of a PDO.
+const fn offset(pdo: &Pdo, wanted: MappingEntry) -> Option<u8> {
+    let (mut entries, mut bit) = (pdo.mapping, 0);
+    while let Some((mapped, more)) = entries.split_first() {
+        if mapped.0 == wanted.0 {
+            return Some(bit / u8::BITS as u8);
+        }
+        bit += mapped.bits();
+        entries = more;
+    }
+    None
+}
+
+/// Whole bytes of a PDO.
+const fn length(pdo: &Pdo) -> u8 {
+    let (mut entries, mut bits) = (pdo.mapping, 0);
+    while let Some((mapped, more)) = entries.split_first() {
+        bits += mapped.bits();
+        entries = more;
+    }
+    bits / u8::BITS as u8
+}
+
+/// Where a reported object lies: from which byte of the TPDOs on, put one behind
+/// the other with eight each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Place(u8);
 
 /// An object that is not mapped lies behind all that is.
-const NOWHERE: Place = Place((MAX_DATA * PDOS) as u8);
-
-/// The objects of one direction as they lie in the PDOs.
-type Image = [u8; IMAGE_BYTES];
+const NOWHERE: Place = Place((MAX_DATA * TPDOS_PER_AXIS) as u8);
 
 impl Place {
     /// The first place of `wanted` in these PDOs; `None`: not mapped.
     const fn find(pdos: &[Pdo], wanted: MappingEntry) -> Option<Place> {
         let mut left = pdos;
         while let Some((pdo, others)) = left.split_first() {
-            let (mut entries, mut bit) = (pdo.mapping, 0);
-            while let Some((mapped, more)) = entries.split_first() {
-                if mapped.0 == wanted.0 && pdo.number as usize <= PDOS {
-                    let first = pdo.number.saturating_sub(1) * MAX_DATA as u8;
-                    return Some(Place(first + bit / u8::BITS as u8));
-                }
-                bit += mapped.bits();
-                entries = more;
+            if let Some(offset) = offset(pdo, wanted)
+                && pdo.number as usize <= TPDOS_PER_AXIS
+            {
+                let first = pdo.number.saturating_sub(1) * MAX_DATA as u8;
+                return Some(Place(first + offset));
             }
             left = others;
         }
@@ -68,55 +87,112 @@ impl Place {
         }
     }
 
-    /// In which PDO, counted from 0.
-    const fn pdo(self) -> u8 {
-        self.0 / MAX_DATA as u8
-    }
-
     /// The object and what follows it; 0 if it is not mapped.
     #[inline]
-    fn read(self, image: &Image) -> u32 {
+    fn read(self, image: &[u8; IMAGE_BYTES]) -> u32 {
         let bytes = image
             .get(usize::from(self.0)..)
             .and_then(<[u8]>::first_chunk);
         bytes.map_or(0, |bytes| u32::from_le_bytes(*bytes))
     }
+}
 
-    /// Writes the first bytes of `value`.
-    #[inline]
-    fn write<const BYTES: usize>(self, image: &mut Image, value: [u8; BYTES]) {
-        let place = image.get_mut(usize::from(self.0)..);
-        if let Some(bytes) = place.and_then(<[u8]>::first_chunk_mut) {
-            *bytes = value;
+/// Bytes of an RPDO while it is made: those that an object of 16 bits at its end is
+/// written into are cut off.
+type Made = [u8; MAX_DATA + 4];
+
+/// An RPDO with two objects that the master writes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Rpdo {
+    /// 1 ..= 4.
+    number: u8,
+    function: FunctionCode,
+    bytes: u8,
+    /// Where the two begin.
+    first: u8,
+    second: u8,
+}
+
+impl Rpdo {
+    /// The first RPDO that carries both.
+    const fn find(pdos: &[Pdo], first: MappingEntry, second: MappingEntry) -> Option<Rpdo> {
+        let mut left = pdos;
+        while let Some((pdo, others)) = left.split_first() {
+            if let (Some(first), Some(second)) = (offset(pdo, first), offset(pdo, second)) {
+                return Some(Rpdo {
+                    number: pdo.number,
+                    function: match pdo.number {
+                        1 => FunctionCode::Rpdo1,
+                        2 => FunctionCode::Rpdo2,
+                        3 => FunctionCode::Rpdo3,
+                        _ => FunctionCode::Rpdo4,
+                    },
+                    bytes: length(pdo),
+                    first,
+                    second,
+                });
+            }
+            left = others;
         }
+        None
+    }
+
+    /// The second object, and over what follows it the first.
+    #[inline]
+    fn data<const BYTES: usize>(&self, first: [u8; BYTES], second: u32) -> [u8; MAX_DATA] {
+        let mut made: Made = [0; MAX_DATA + 4];
+        if let Some(place) = made.get_mut(usize::from(self.second)..)
+            && let Some(place) = place.first_chunk_mut()
+        {
+            *place = second.to_le_bytes();
+        }
+        if let Some(place) = made.get_mut(usize::from(self.first)..)
+            && let Some(place) = place.first_chunk_mut()
+        {
+            *place = first;
+        }
+        let [a, b, c, d, e, f, g, h, ..] = made;
+        [a, b, c, d, e, f, g, h]
+    }
+
+    fn frame(&self, node: NodeId, data: [u8; MAX_DATA]) -> Frame {
+        Frame::of_padded(CobId::of(self.function, node), self.bytes, data)
+    }
+}
+
+/// Targets that the modes of operation have.
+const TARGETS: usize = 3;
+
+/// Which of them a mode has; homing has that of velocity, at 0.
+const fn target_of(mode: Mode) -> usize {
+    match mode {
+        Mode::ProfileVelocity | Mode::CyclicVelocity | Mode::Homing => 0,
+        Mode::ProfilePosition | Mode::CyclicPosition => 1,
+        Mode::CyclicTorque => 2,
     }
 }
 
 /// The PDOs of one axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AxisPdos {
-    /// In the order of [`AxisCommand`].
-    commands: [Place; 4],
+    /// Controlword and target, by [`target_of`] the mode.
+    targets: [Option<Rpdo>; TARGETS],
+    /// Profile acceleration and deceleration.
+    ramps: Option<Rpdo>,
     /// In the order of [`AxisFeedback`].
     feedback: [Place; 4],
-    rpdo_bytes: [u8; PDOS],
-    tpdo_bytes: [u8; PDOS],
+    tpdo_bytes: [u8; TPDOS_PER_AXIS],
 }
 
-/// Whole bytes of the PDOs; 0 where there is none.
-const fn lengths(pdos: &[Pdo]) -> [u8; PDOS] {
-    let mut bytes = [0; PDOS];
+/// Whole bytes of the TPDOs; 0 where there is none.
+const fn lengths(pdos: &[Pdo]) -> [u8; TPDOS_PER_AXIS] {
+    let mut bytes = [0; TPDOS_PER_AXIS];
     let mut left = pdos;
     while let Some((pdo, others)) = left.split_first() {
-        let (mut entries, mut bits) = (pdo.mapping, 0);
-        while let Some((mapped, more)) = entries.split_first() {
-            bits += mapped.bits();
-            entries = more;
-        }
         let [first, second] = &mut bytes;
         match pdo.number {
-            1 => *first = bits / u8::BITS as u8,
-            2 => *second = bits / u8::BITS as u8,
+            1 => *first = length(pdo),
+            2 => *second = length(pdo),
             _ => {}
         }
         left = others;
@@ -127,39 +203,36 @@ const fn lengths(pdos: &[Pdo]) -> [u8; PDOS] {
 impl AxisPdos {
     /// Nothing is exchanged.
     const NONE: AxisPdos = AxisPdos {
-        commands: [NOWHERE; 4],
+        targets: [None; TARGETS],
+        ramps: None,
         feedback: [NOWHERE; 4],
-        rpdo_bytes: [0; PDOS],
-        tpdo_bytes: [0; PDOS],
+        tpdo_bytes: [0; TPDOS_PER_AXIS],
     };
 
     /// The PDOs as `node` has them mapped. `None` if an object is missing that an
-    /// axis cannot be led without.
+    /// axis cannot be led without in profile velocity mode, in which it starts.
     pub const fn of(node: &Node) -> Option<AxisPdos> {
-        let (
-            Some(controlword),
-            Some(target),
-            Some(acceleration),
-            Some(deceleration),
-            Some(statusword),
-            Some(position),
-        ) = (
-            Place::find(node.rpdos, CONTROLWORD),
-            Place::find(node.rpdos, TARGET_VELOCITY),
-            Place::find(node.rpdos, ACCELERATION),
-            Place::find(node.rpdos, DECELERATION),
+        let (Some(velocity), Some(ramps), Some(statusword), Some(position)) = (
+            Rpdo::find(node.rpdos, CONTROLWORD, TARGET_VELOCITY),
+            Rpdo::find(node.rpdos, ACCELERATION, DECELERATION),
             Place::find(node.tpdos, STATUSWORD),
             Place::find(node.tpdos, POSITION),
-        )
-        else {
+        ) else {
             return None;
         };
-        let velocity = Place::find_or_nowhere(node.tpdos, VELOCITY);
-        let torque = Place::find_or_nowhere(node.tpdos, TORQUE);
         Some(AxisPdos {
-            commands: [controlword, target, acceleration, deceleration],
-            feedback: [statusword, position, velocity, torque],
-            rpdo_bytes: lengths(node.rpdos),
+            targets: [
+                Some(velocity),
+                Rpdo::find(node.rpdos, CONTROLWORD, TARGET_POSITION),
+                Rpdo::find(node.rpdos, CONTROLWORD, TARGET_TORQUE),
+            ],
+            ramps: Some(ramps),
+            feedback: [
+                statusword,
+                position,
+                Place::find_or_nowhere(node.tpdos, VELOCITY),
+                Place::find_or_nowhere(node.tpdos, TORQUE),
+            ],
             tpdo_bytes: lengths(node.tpdos),
         })
     }
@@ -206,8 +279,18 @@ impl AxisPdos {
         velocity.0 != NOWHERE.0
     }
 
+    /// Whether an RPDO carries the target of a mode.
+    pub fn has_mode(&self, mode: Mode) -> bool {
+        self.target(mode).is_some()
+    }
+
+    #[inline]
+    fn target(&self, mode: Mode) -> Option<&Rpdo> {
+        self.targets.get(target_of(mode))?.as_ref()
+    }
+
     /// What the TPDOs of the axis say. `fresh`: all came with this SYNC.
-    pub fn feedback(&self, image: &Image, fresh: bool) -> AxisFeedback {
+    pub fn feedback(&self, image: &[u8; IMAGE_BYTES], fresh: bool) -> AxisFeedback {
         let [statusword, position, velocity, torque] = self.feedback;
         AxisFeedback {
             statusword: statusword.read(image) as u16,
@@ -218,49 +301,55 @@ impl AxisPdos {
         }
     }
 
-    /// Whether the RPDO `number`, counted from 0, carries nothing but ramps: it
-    /// is sent when they change.
-    pub fn has_only_ramps(&self, number: u8) -> bool {
-        let [controlword, velocity, ..] = &self.commands;
-        controlword.pdo() != number && velocity.pdo() != number
+    /// The RPDO of every cycle for `node`: that of the mode of `command`. `None`: it
+    /// is not mapped.
+    #[inline]
+    pub fn cyclic(&self, command: &AxisCommand, node: NodeId) -> Option<Frame> {
+        let rpdo = self.target(command.mode)?;
+        Some(rpdo.frame(node, Self::target_data(rpdo, command)))
     }
 
-    /// The RPDOs of the axis.
-    pub fn image(&self, command: &AxisCommand) -> Image {
-        let mut image = [0; IMAGE_BYTES];
-        let [controlword, velocity, acceleration, deceleration] = self.commands;
-        controlword.write(&mut image, command.controlword.to_le_bytes());
-        velocity.write(&mut image, command.target.to_le_bytes());
-        acceleration.write(&mut image, command.acceleration.to_le_bytes());
-        deceleration.write(&mut image, command.deceleration.to_le_bytes());
-        image
+    fn target_data(rpdo: &Rpdo, command: &AxisCommand) -> [u8; MAX_DATA] {
+        rpdo.data(command.controlword.to_le_bytes(), command.target as u32)
     }
 
-    /// The RPDO `number`, counted from 0, for `node`. `None`: it has none.
-    pub fn rpdo(&self, number: u8, node: NodeId, image: &Image) -> Option<Frame> {
-        let function = match number {
-            0 => FunctionCode::Rpdo1,
-            _ => FunctionCode::Rpdo2,
-        };
-        let number = usize::from(number);
-        let length = *self.rpdo_bytes.get(number)?;
-        let data = image.get(number * MAX_DATA..)?.first_chunk()?;
-        let frame = Frame::of_padded(CobId::of(function, node), length, *data);
-        (length > 0).then_some(frame)
+    /// The RPDO with the ramps of `command` for `node`.
+    #[inline]
+    pub fn ramps(&self, command: &AxisCommand, node: NodeId) -> Option<Frame> {
+        let rpdo = self.ramps.as_ref()?;
+        Some(rpdo.frame(node, Self::ramps_data(rpdo, command)))
+    }
+
+    fn ramps_data(rpdo: &Rpdo, command: &AxisCommand) -> [u8; MAX_DATA] {
+        rpdo.data(command.acceleration.to_le_bytes(), command.deceleration)
+    }
+
+    /// The bytes of the RPDO `number`, counted from 1, as `command` has it sent;
+    /// zeros of one that it has not.
+    pub fn rpdo(&self, number: u8, command: &AxisCommand) -> [u8; MAX_DATA] {
+        let is = |rpdo: &&Rpdo| rpdo.number == number;
+        if let Some(rpdo) = self.target(command.mode).filter(is) {
+            return Self::target_data(rpdo, command);
+        }
+        match self.ramps.as_ref().filter(is) {
+            Some(rpdo) => Self::ramps_data(rpdo, command),
+            None => [0; MAX_DATA],
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion::mode::Mode;
     use crate::network::sample::SIX_EPOS4;
+
+    const PDOS: usize = TPDOS_PER_AXIS;
 
     fn pdos() -> [AxisPdos; 6] {
         AxisPdos::of_all(&SIX_EPOS4).unwrap()
     }
 
-    fn image(tpdos: [[u8; MAX_DATA]; PDOS]) -> Image {
+    fn image(tpdos: [[u8; MAX_DATA]; PDOS]) -> [u8; IMAGE_BYTES] {
         let mut image = [0; IMAGE_BYTES];
         image[..PDOS * MAX_DATA].copy_from_slice(&tpdos.concat());
         image
@@ -270,6 +359,8 @@ mod tests {
     fn the_sample_network_has_these_pdos() {
         assert_eq!(AxisPdos::tpdo_bytes(&pdos()), [[6, 6]; 6]);
         assert_eq!(AxisPdos::of_all::<7>(&SIX_EPOS4), None);
+        let [pdos, ..] = pdos();
+        assert!(Mode::ALL.into_iter().all(|mode| pdos.has_mode(mode)));
     }
 
     const COMMAND: AxisCommand = AxisCommand {
@@ -280,19 +371,48 @@ mod tests {
         deceleration: 0x0102_0304,
     };
 
+    const fn in_mode(mode: Mode) -> AxisCommand {
+        AxisCommand { mode, ..COMMAND }
+    }
+
+    /// The four RPDOs are mapped once; per cycle the one of the active mode is sent.
     #[test]
-    fn golden_bytes_both_ways() {
+    fn golden_bytes_of_every_mode() {
         let [pdos, ..] = pdos();
         let node = NodeId::constant::<3>();
-        let frame = pdos.rpdo(0, node, &pdos.image(&COMMAND)).unwrap();
-        assert_eq!(frame.id().get(), 0x203);
-        assert_eq!(frame.data(), [0x0F, 0x00, 0x50, 0xFB, 0xFF, 0xFF]);
-        let frame = pdos.rpdo(1, node, &pdos.image(&COMMAND)).unwrap();
+        let target = [0x0F, 0x00, 0x50, 0xFB, 0xFF, 0xFF];
+        for (mode, id, bytes) in [
+            (Mode::ProfileVelocity, 0x203, 6),
+            (Mode::CyclicVelocity, 0x203, 6),
+            (Mode::Homing, 0x203, 6),
+            (Mode::ProfilePosition, 0x403, 6),
+            (Mode::CyclicPosition, 0x403, 6),
+            (Mode::CyclicTorque, 0x503, 4),
+        ] {
+            let frame = pdos.cyclic(&in_mode(mode), node).unwrap();
+            assert_eq!(frame.id().get(), id, "{mode:?}");
+            assert_eq!(frame.data(), &target[..bytes], "{mode:?}");
+        }
+        let frame = pdos.ramps(&COMMAND, node).unwrap();
         assert_eq!(frame.id().get(), 0x303);
         assert_eq!(frame.data(), [0xDC, 0x05, 0, 0, 4, 3, 2, 1]);
-        assert_eq!(pdos.rpdo(2, node, &pdos.image(&COMMAND)), None);
-        assert!(!pdos.has_only_ramps(0) && pdos.has_only_ramps(1));
+    }
 
+    #[test]
+    fn golden_bytes_by_number() {
+        let [pdos, ..] = pdos();
+        let command = in_mode(Mode::CyclicPosition);
+        assert_eq!(pdos.rpdo(1, &command), [0; MAX_DATA]);
+        let ramps = [0xDC, 0x05, 0, 0, 4, 3, 2, 1];
+        assert_eq!(pdos.rpdo(2, &command), ramps);
+        let target = [0x0F, 0x00, 0x50, 0xFB, 0xFF, 0xFF, 0, 0];
+        assert_eq!(pdos.rpdo(3, &command), target);
+        assert_eq!(pdos.rpdo(4, &command), [0; MAX_DATA]);
+    }
+
+    #[test]
+    fn golden_bytes_of_the_feedback() {
+        let [pdos, ..] = pdos();
         let got = pdos.feedback(
             &image([
                 [0x37, 0x16, 0xFE, 0xFF, 0xFF, 0xFF, 0xAA, 0xAA],
@@ -310,20 +430,22 @@ mod tests {
         assert_eq!(got, expected);
     }
 
+    const fn pdo(number: u8, mapping: &'static [MappingEntry]) -> Pdo {
+        Pdo {
+            number,
+            transmission: crate::pdo::Transmission::Synchronous(1),
+            mapping,
+        }
+    }
+
     /// Another order, another division, a gap, and no torque.
     #[test]
     fn another_mapping() {
         const OTHER: MappingEntry = MappingEntry::new(0x6061, 0, 8);
-        const fn pdo(number: u8, mapping: &'static [MappingEntry]) -> Pdo {
-            Pdo {
-                number,
-                transmission: crate::pdo::Transmission::Synchronous(1),
-                mapping,
-            }
-        }
         const RPDOS: &[Pdo] = &[
-            pdo(2, &[TARGET_VELOCITY, CONTROLWORD]),
+            pdo(4, &[TARGET_VELOCITY, CONTROLWORD]),
             pdo(1, &[DECELERATION, ACCELERATION]),
+            pdo(2, &[TARGET_TORQUE, CONTROLWORD]),
         ];
         const TPDOS: &[Pdo] = &[
             pdo(1, &[OTHER, VELOCITY]),
@@ -335,11 +457,17 @@ mod tests {
             ..crate::network::sample::epos4(NodeId::constant::<7>(), "axis 7")
         };
         let pdos = AxisPdos::of(&node).unwrap();
-        let frame = pdos.rpdo(0, node.id, &pdos.image(&COMMAND)).unwrap();
+        let frame = pdos.ramps(&COMMAND, node.id).unwrap();
+        assert_eq!(frame.id().get(), 0x207);
         assert_eq!(frame.data(), [4, 3, 2, 1, 0xDC, 0x05, 0, 0]);
-        let frame = pdos.rpdo(1, node.id, &pdos.image(&COMMAND)).unwrap();
+        let frame = pdos.cyclic(&COMMAND, node.id).unwrap();
+        assert_eq!(frame.id().get(), 0x507);
         assert_eq!(frame.data(), [0x50, 0xFB, 0xFF, 0xFF, 0x0F, 0x00]);
-        assert!(pdos.has_only_ramps(0) && !pdos.has_only_ramps(1));
+        // The upper half of the target is under the controlword.
+        let torque = pdos.cyclic(&in_mode(Mode::CyclicTorque), node.id).unwrap();
+        assert_eq!(torque.data(), [0x50, 0xFB, 0x0F, 0x00]);
+        assert!(!pdos.has_mode(Mode::CyclicPosition));
+        assert_eq!(pdos.cyclic(&in_mode(Mode::CyclicPosition), node.id), None);
         let tpdos = image([
             [3, 0xE8, 0x03, 0, 0, 0, 0, 0],
             [0xFE, 0xFF, 0xFF, 0xFF, 3, 0x37, 0x16, 0],
@@ -362,5 +490,14 @@ mod tests {
 
         let blind = Node { tpdos: &[], ..node };
         assert_eq!(AxisPdos::of(&blind), None);
+        const APART: &[Pdo] = &[
+            pdo(1, &[CONTROLWORD, ACCELERATION]),
+            pdo(2, &[TARGET_VELOCITY, DECELERATION]),
+        ];
+        let apart = Node {
+            rpdos: APART,
+            ..node
+        };
+        assert_eq!(AxisPdos::of(&apart), None);
     }
 }

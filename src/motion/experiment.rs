@@ -32,6 +32,8 @@ pub struct Motor {
     pub max_acceleration: u32,
     /// No farther from home than these, increments (607Dh): the lower, the upper.
     pub limits: (i32, i32),
+    /// Modes of operation that the drive has (6502h) and the network has mapped.
+    pub modes: u32,
 }
 
 impl Motor {
@@ -42,6 +44,7 @@ impl Motor {
         max_speed: 3000,
         max_acceleration: 20_000,
         limits: (-i32::MAX, i32::MAX),
+        modes: Mode::EPOS4,
     };
 
     /// The motor with its drive as the group leads it.
@@ -56,7 +59,7 @@ impl Motor {
             following_error_max: self.following_error(),
             in_position: 2,
             scale: Scale::new(turn, cycle),
-            modes: Mode::EPOS4,
+            modes: self.modes,
             mode: Mode::ProfileVelocity,
             torque_max: TORQUE_MAX,
         }

@@ -58,6 +58,22 @@ const RPDOS: &[Pdo] = &[
             mapped(objects::PROFILE_DECELERATION, 32),
         ],
     },
+    Pdo {
+        number: 3,
+        transmission: EVERY_SYNC,
+        mapping: &[
+            mapped(objects::CONTROLWORD, 16),
+            mapped(objects::TARGET_POSITION, 32),
+        ],
+    },
+    Pdo {
+        number: 4,
+        transmission: EVERY_SYNC,
+        mapping: &[
+            mapped(objects::CONTROLWORD, 16),
+            mapped(objects::TARGET_TORQUE, 16),
+        ],
+    },
 ];
 
 const TPDOS: &[Pdo] = &[

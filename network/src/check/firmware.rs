@@ -1,5 +1,6 @@
-//! What the firmware of this project can do: profile velocity mode, every object of
-//! it in RPDO1, RPDO2, TPDO1 and TPDO2 at every SYNC.
+//! What the firmware of this project can do: start in profile velocity mode, with the
+//! target of each mode and the controlword in one RPDO, the ramps in another, and what
+//! is reported in TPDO1 and TPDO2, all at every SYNC.
 
 use toml::Spanned;
 
@@ -11,8 +12,8 @@ use crate::resolve::Context;
 
 /// A set of TPDOs is kept in 32 bits, two of each node.
 const NODES_MAX: usize = 16;
-/// PDOs of each direction that it exchanges with an axis.
-const PDOS_MAX: u8 = 2;
+/// TPDOs that it takes in of an axis.
+const TPDOS_MAX: u8 = 2;
 /// At every SYNC.
 const EVERY_SYNC: u8 = 1;
 const PROFILE_VELOCITY: u32 = 3;
@@ -24,15 +25,36 @@ const SPEED_MIN: u32 = 60;
 const ACCELERATION_MIN: u32 = 100;
 const MODES_OF_OPERATION: Address = Address::new(0x6060, 0);
 
-/// What it writes in every cycle, and its bits.
-const COMMANDS: [(Address, u8, &str); 4] = [
-    (Address::new(0x6040, 0), 16, "Controlword"),
-    (Address::new(0x60FF, 0), 32, "Target velocity"),
-    (Address::new(0x6083, 0), 32, "Profile acceleration"),
-    (Address::new(0x6084, 0), 32, "Profile deceleration"),
+/// An object, its bits, its name.
+type Wanted = (Address, u8, &'static str);
+
+const CONTROLWORD: Wanted = (Address::new(0x6040, 0), 16, "Controlword");
+/// The RPDOs that it sends: each has these two objects, and no other. `true`: without
+/// it no axis can be led.
+const RPDOS: [(Wanted, Wanted, bool); 4] = [
+    (
+        CONTROLWORD,
+        (Address::new(0x60FF, 0), 32, "Target velocity"),
+        true,
+    ),
+    (
+        (Address::new(0x6083, 0), 32, "Profile acceleration"),
+        (Address::new(0x6084, 0), 32, "Profile deceleration"),
+        true,
+    ),
+    (
+        CONTROLWORD,
+        (Address::new(0x607A, 0), 32, "Target position"),
+        false,
+    ),
+    (
+        CONTROLWORD,
+        (Address::new(0x6071, 0), 16, "Target torque"),
+        false,
+    ),
 ];
 /// What it has to be told.
-const FEEDBACK: [(Address, u8, &str); 2] = [
+const FEEDBACK: [Wanted; 2] = [
     (Address::new(0x6041, 0), 16, "Statusword"),
     (Address::new(0x6064, 0), 32, "Position actual value"),
 ];
@@ -150,9 +172,9 @@ fn numbers(
 }
 
 fn pdos(direction: Direction, node: &Node, described: &Described, context: &mut Context<'_>) {
-    let (pdos, wanted): (&[Pdo], &[_]) = match direction {
-        Direction::Receive => (&node.rpdos, &COMMANDS),
-        Direction::Transmit => (&node.tpdos, &FEEDBACK),
+    let pdos: &[Pdo] = match direction {
+        Direction::Receive => &node.rpdos,
+        Direction::Transmit => &node.tpdos,
     };
     let word = direction.word();
     let mut problem = |value: String, rule: String, help: String| {
@@ -161,11 +183,11 @@ fn pdos(direction: Direction, node: &Node, described: &Described, context: &mut 
     };
     for pdo in pdos {
         let name = format!("{word}{}", pdo.number);
-        if pdo.number > PDOS_MAX {
+        if direction == Direction::Transmit && pdo.number > TPDOS_MAX {
             problem(
                 name,
-                format!("the firmware exchanges {word}1 and {word}2 with an axis"),
-                format!("map its objects in {word}1 or {word}2"),
+                "the firmware takes in TPDO1 and TPDO2 of an axis".to_string(),
+                "map its objects in TPDO1 or TPDO2".to_string(),
             );
             continue;
         }
@@ -179,12 +201,15 @@ fn pdos(direction: Direction, node: &Node, described: &Described, context: &mut 
         if pdo.send == Send::OnChange && pdo.answers_to_tpdos() {
             problem(
                 name.clone(),
-                "the firmware sends controlword and target velocity in every cycle".to_string(),
-                "leave send out, or move them to the other RPDO".to_string(),
+                "the firmware sends controlword and target in every cycle".to_string(),
+                "leave send out, or move them to another RPDO".to_string(),
             );
         }
         for entry in &pdo.mapping {
-            let known = wanted.iter().any(|(at, ..)| *at == entry.at);
+            let is = |wanted: &Wanted| wanted.0 == entry.at;
+            let known = RPDOS
+                .iter()
+                .any(|(first, second, _)| is(first) || is(second));
             if direction == Direction::Receive && !known {
                 problem(
                     format!("{} \"{}\"", entry.at, entry.name),
@@ -201,17 +226,66 @@ fn pdos(direction: Direction, node: &Node, described: &Described, context: &mut 
             }
         }
     }
-    for (at, bits, name) in wanted {
-        let entries = pdos.iter().flat_map(|pdo| &pdo.mapping);
-        let times = entries.filter(|e| e.at == *at && e.bits == *bits).count();
-        if times != 1 {
+    match direction {
+        Direction::Receive => rpdos(pdos, node, &mut problem),
+        Direction::Transmit => {
+            for (at, bits, name) in FEEDBACK {
+                let entries = pdos.iter().flat_map(|pdo| &pdo.mapping);
+                let times = entries.filter(|e| e.at == at && e.bits == bits).count();
+                if times != 1 {
+                    problem(
+                        format!("{at} \"{name}\""),
+                        format!(
+                            "the firmware needs it once in TPDO1 or TPDO2 of \"{}\"",
+                            node.name
+                        ),
+                        "map it once in TPDO1 or TPDO2".to_string(),
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// Each RPDO is one of those that the firmware sends, and each of these is there once.
+fn rpdos(pdos: &[Pdo], node: &Node, problem: &mut impl FnMut(String, String, String)) {
+    let has = |pdo: &Pdo, (at, bits, _): &Wanted| {
+        let mut entries = pdo.mapping.iter();
+        entries.any(|entry| entry.at == *at && entry.bits == *bits)
+    };
+    let pairs = || {
+        let pair = |(first, second, _): &(Wanted, Wanted, bool)| {
+            format!("\"{}\" and \"{}\"", first.2, second.2)
+        };
+        let all: Vec<String> = RPDOS.iter().map(pair).collect();
+        all.join("; ")
+    };
+    for pdo in pdos {
+        let (objects, written) = (pdo.mapping.len(), pdo.answers_to_tpdos() || pdo.has_ramps());
+        let whole = RPDOS
+            .iter()
+            .any(|(first, second, _)| objects == 2 && has(pdo, first) && has(pdo, second));
+        if written && !whole {
             problem(
-                format!("{at} \"{name}\""),
+                format!("RPDO{}", pdo.number),
+                "the firmware writes two objects in an RPDO, one of its pairs".to_string(),
+                format!("map one of these pairs: {}", pairs()),
+            );
+        }
+    }
+    for (first, second, needed) in &RPDOS {
+        let both = pdos
+            .iter()
+            .filter(|pdo| has(pdo, first) && has(pdo, second));
+        let times = both.count();
+        if times > 1 || (times == 0 && *needed) {
+            problem(
+                format!("{} \"{}\"", second.0, second.2),
                 format!(
-                    "the firmware needs it once in {word}1 or {word}2 of \"{}\"",
-                    node.name
+                    "the firmware needs it once in the RPDOs of \"{}\", beside \"{}\"",
+                    node.name, first.2
                 ),
-                format!("map it once in {word}1 or {word}2"),
+                format!("map it once, in the RPDO with \"{}\"", first.2),
             );
         }
     }

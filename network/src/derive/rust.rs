@@ -119,7 +119,8 @@ fn motors(machine: &Machine, out: &mut String) -> std::fmt::Result {
         writeln!(out, "        gear: ({motor_turns}, {load_turns}),")?;
         writeln!(out, "        max_speed: {},", motor.max_speed)?;
         writeln!(out, "        max_acceleration: {},", motor.max_acceleration)?;
-        writeln!(out, "        limits: {:?},\n    }},", motor.limits)?;
+        writeln!(out, "        limits: {:?},", motor.limits)?;
+        writeln!(out, "        modes: 0x{:X},\n    }},", motor.modes)?;
     }
     writeln!(out, "];\n")
 }

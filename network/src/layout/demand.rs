@@ -1,5 +1,7 @@
 //! What a cycle has to hold.
 
+use std::cmp::Reverse;
+
 use super::{NS_PER_S, NS_PER_US, PER_MILLE, US_PER_MS};
 use crate::frame::{EMCY_BYTES, HEARTBEAT_BYTES, SDO_BYTES, SYNC_BYTES, TIME_BYTES, longest_bits};
 use crate::model::{Node, Pdo, Send};
@@ -95,7 +97,15 @@ impl Demand {
                 (pdo.cob_id(node.id), what, pdo.bytes())
             };
             demand.tpdos.extend(node.tpdos.iter().map(of));
+            // Of those with a controlword, the one of the active mode is sent: there is
+            // room for the longest.
+            let with_modes = node.rpdos.iter().filter(|pdo| pdo.is_of_a_mode());
+            let longest = with_modes.map(|pdo| (pdo.bytes(), Reverse(pdo.number)));
+            let longest = longest.max().map(|(_, Reverse(number))| number);
             for pdo in &node.rpdos {
+                if pdo.is_of_a_mode() && Some(pdo.number) != longest {
+                    continue;
+                }
                 let list = match (pdo.send, pdo.answers_to_tpdos()) {
                     (Send::OnChange, _) => &mut demand.on_change,
                     (Send::EveryCycle, false) => &mut demand.ramps,

@@ -70,6 +70,7 @@ const TURNS: std::ops::RangeInclusive<i64> = 1..=1_000_000;
 pub(super) struct Resolved {
     pub(super) increments_per_turn: Option<u32>,
     pub(super) gear: (u32, u32),
+    pub(super) supported_modes: Option<u32>,
     pub(super) writes: Vec<Write>,
 }
 
@@ -159,6 +160,7 @@ pub(super) fn resolve(
     writer.complete.then_some(Resolved {
         increments_per_turn,
         gear: gear?,
+        supported_modes: supported_modes(eds, node).map(|bits| bits as u32),
         writes: writer.writes,
     })
 }
@@ -251,11 +253,7 @@ impl Writer<'_> {
             self.complete = false;
             return None;
         };
-        let supported = self
-            .eds
-            .entry(SUPPORTED_MODES)
-            .and_then(|entry| entry.default);
-        let supported = supported.map(|number| number.with_node_id(self.node));
+        let supported = supported_modes(self.eds, self.node);
         if let Some(supported) = supported.filter(|bits| bits >> mode.bit & 1 == 0) {
             let has: Vec<&str> = MODES
                 .iter()
@@ -344,6 +342,12 @@ impl Writer<'_> {
             None => {}
         }
     }
+}
+
+/// 6502h as the EDS has it.
+fn supported_modes(eds: &Eds, node: u8) -> Option<i128> {
+    let default = eds.entry(SUPPORTED_MODES)?.default;
+    default.map(|number| number.with_node_id(node))
 }
 
 /// A cycle in units of 10^exponent seconds, if that is a whole number.

@@ -225,6 +225,7 @@ fn resolve_node(
         tpdos,
         increments_per_turn: axis.increments_per_turn,
         gear: axis.gear,
+        supported_modes: axis.supported_modes,
         start_values: axis.writes,
     })
 }

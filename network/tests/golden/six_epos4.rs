@@ -56,6 +56,7 @@ pub const MOTORS: [Motor; AXES] = [
         max_speed: 3000,
         max_acceleration: 20000,
         limits: (-2147483647, 2147483647),
+        modes: 0x3A5,
     },
     Motor {
         increments_per_turn: 2000,
@@ -63,6 +64,7 @@ pub const MOTORS: [Motor; AXES] = [
         max_speed: 3000,
         max_acceleration: 20000,
         limits: (-2147483647, 2147483647),
+        modes: 0x3A5,
     },
     Motor {
         increments_per_turn: 2000,
@@ -70,6 +72,7 @@ pub const MOTORS: [Motor; AXES] = [
         max_speed: 3000,
         max_acceleration: 20000,
         limits: (-2147483647, 2147483647),
+        modes: 0x3A5,
     },
     Motor {
         increments_per_turn: 2000,
@@ -77,6 +80,7 @@ pub const MOTORS: [Motor; AXES] = [
         max_speed: 3000,
         max_acceleration: 20000,
         limits: (-2147483647, 2147483647),
+        modes: 0x3A5,
     },
     Motor {
         increments_per_turn: 2000,
@@ -84,6 +88,7 @@ pub const MOTORS: [Motor; AXES] = [
         max_speed: 3000,
         max_acceleration: 20000,
         limits: (-2147483647, 2147483647),
+        modes: 0x3A5,
     },
     Motor {
         increments_per_turn: 2000,
@@ -91,6 +96,7 @@ pub const MOTORS: [Motor; AXES] = [
         max_speed: 3000,
         max_acceleration: 20000,
         limits: (-2147483647, 2147483647),
+        modes: 0x3A5,
     },
 ];
 
@@ -135,6 +141,22 @@ pub static NETWORK: Network = Network {
                     mapping: &[
                         canmaster::pdo::MappingEntry::new(0x6083, 0, 32),
                         canmaster::pdo::MappingEntry::new(0x6084, 0, 32),
+                    ],
+                },
+                canmaster::network::Pdo {
+                    number: 3,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
+                        canmaster::pdo::MappingEntry::new(0x607A, 0, 32),
+                    ],
+                },
+                canmaster::network::Pdo {
+                    number: 4,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
+                        canmaster::pdo::MappingEntry::new(0x6071, 0, 16),
                     ],
                 },
             ],
@@ -198,6 +220,22 @@ pub static NETWORK: Network = Network {
                         canmaster::pdo::MappingEntry::new(0x6084, 0, 32),
                     ],
                 },
+                canmaster::network::Pdo {
+                    number: 3,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
+                        canmaster::pdo::MappingEntry::new(0x607A, 0, 32),
+                    ],
+                },
+                canmaster::network::Pdo {
+                    number: 4,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
+                        canmaster::pdo::MappingEntry::new(0x6071, 0, 16),
+                    ],
+                },
             ],
             tpdos: &[
                 canmaster::network::Pdo {
@@ -257,6 +295,22 @@ pub static NETWORK: Network = Network {
                     mapping: &[
                         canmaster::pdo::MappingEntry::new(0x6083, 0, 32),
                         canmaster::pdo::MappingEntry::new(0x6084, 0, 32),
+                    ],
+                },
+                canmaster::network::Pdo {
+                    number: 3,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
+                        canmaster::pdo::MappingEntry::new(0x607A, 0, 32),
+                    ],
+                },
+                canmaster::network::Pdo {
+                    number: 4,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
+                        canmaster::pdo::MappingEntry::new(0x6071, 0, 16),
                     ],
                 },
             ],
@@ -320,6 +374,22 @@ pub static NETWORK: Network = Network {
                         canmaster::pdo::MappingEntry::new(0x6084, 0, 32),
                     ],
                 },
+                canmaster::network::Pdo {
+                    number: 3,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
+                        canmaster::pdo::MappingEntry::new(0x607A, 0, 32),
+                    ],
+                },
+                canmaster::network::Pdo {
+                    number: 4,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
+                        canmaster::pdo::MappingEntry::new(0x6071, 0, 16),
+                    ],
+                },
             ],
             tpdos: &[
                 canmaster::network::Pdo {
@@ -381,6 +451,22 @@ pub static NETWORK: Network = Network {
                         canmaster::pdo::MappingEntry::new(0x6084, 0, 32),
                     ],
                 },
+                canmaster::network::Pdo {
+                    number: 3,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
+                        canmaster::pdo::MappingEntry::new(0x607A, 0, 32),
+                    ],
+                },
+                canmaster::network::Pdo {
+                    number: 4,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
+                        canmaster::pdo::MappingEntry::new(0x6071, 0, 16),
+                    ],
+                },
             ],
             tpdos: &[
                 canmaster::network::Pdo {
@@ -440,6 +526,22 @@ pub static NETWORK: Network = Network {
                     mapping: &[
                         canmaster::pdo::MappingEntry::new(0x6083, 0, 32),
                         canmaster::pdo::MappingEntry::new(0x6084, 0, 32),
+                    ],
+                },
+                canmaster::network::Pdo {
+                    number: 3,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
+                        canmaster::pdo::MappingEntry::new(0x607A, 0, 32),
+                    ],
+                },
+                canmaster::network::Pdo {
+                    number: 4,
+                    transmission: canmaster::pdo::Transmission::from_code(1),
+                    mapping: &[
+                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
+                        canmaster::pdo::MappingEntry::new(0x6071, 0, 16),
                     ],
                 },
             ],

@@ -198,6 +198,7 @@ fn motor(node: &model::Node) -> Option<Motor> {
         max_speed: motor.max_speed,
         max_acceleration: motor.max_acceleration,
         limits: motor.limits,
+        modes: motor.modes,
     })
 }
 

@@ -281,8 +281,8 @@ fn round_of(bench: &mut Bench, ids: &[NodeId], nodes: u32) -> Result<Round> {
     for n in 0..nodes as usize {
         let id = ids[n % ids.len()];
         let command = random.command();
-        let image = pdos.image(&command);
-        for frame in [0, 1].iter().filter_map(|n| pdos.rpdo(*n, id, &image)) {
+        let frames = [pdos.cyclic(&command, id), pdos.ramps(&command, id)];
+        for frame in frames.into_iter().flatten() {
             bench.send(frame);
         }
         commands.retain(|(other, _)| *other != id);
