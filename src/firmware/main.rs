@@ -30,6 +30,7 @@ mod lines;
 mod log;
 #[cfg(target_os = "none")]
 mod measured;
+#[cfg(target_os = "none")]
 mod modes;
 #[cfg(target_os = "none")]
 mod own_node;

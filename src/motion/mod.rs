@@ -20,6 +20,7 @@ pub mod experiment;
 mod fixed;
 mod group;
 pub mod mode;
+pub mod panel;
 pub mod path;
 pub mod plan;
 mod position_control;

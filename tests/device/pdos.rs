@@ -14,7 +14,10 @@ fn the_masters_rpdos_are_the_nodes_tpdos() {
             let base = [0x180, 0x280][n];
             assert_eq!(b.number(0x1400 + offset, 1), Ok(base + id));
             assert_eq!(b.number(0x1400 + offset, 2), Ok(1));
-            let base = [0x200, 0x300][n];
+        }
+        for n in 0..4 {
+            let offset = (place * 4 + n) as u16;
+            let base = [0x200, 0x300, 0x400, 0x500][n];
             // Not to be asked for by remote frames.
             assert_eq!(b.number(0x1800 + offset, 1), Ok(0x4000_0000 + base + id));
             assert_eq!(b.number(0x1800 + offset, 2), Ok(1));
@@ -29,9 +32,10 @@ fn mappings_lead_to_the_process_image() {
     let mut b = Bench::new();
     for (place, known) in SIX_EPOS4.nodes.iter().enumerate() {
         let id = known.id.get();
-        for (base, pdos, direction) in [(0x1600, known.tpdos, 1_u8), (0x1A00, known.rpdos, 2)] {
+        let directions = [(0x1600, known.tpdos, 1_u8), (0x1A00, known.rpdos, 2)];
+        for (base, pdos, direction) in directions {
             for (n, pdo) in pdos.iter().enumerate() {
-                let index = base + (place * 2 + n) as u16;
+                let index = base + (place * pdos.len() + n) as u16;
                 let count = b.number(index, 0).unwrap() as u8;
                 assert_eq!(usize::from(count), pdo.mapping.len());
                 let tail = [1, 2, 3, 4, 5, 6].map(|low| direction << 4 | low);
@@ -47,6 +51,6 @@ fn mappings_lead_to_the_process_image() {
                 }
             }
         }
-        assert_eq!(b.number(0x3000 + u16::from(id), 0), Ok(8));
+        assert_eq!(b.number(0x3000 + u16::from(id), 0), Ok(12));
     }
 }

@@ -7,6 +7,7 @@ mod built_in;
 mod contract;
 mod faults;
 mod modes;
+mod panel;
 mod paths;
 mod plant;
 mod programs;

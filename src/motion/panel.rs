@@ -1,0 +1,450 @@
+//! The group in the hands of any CANopen client: objects 2000h to 2010h of the board
+//! (`docs/motion.md`, "Commands"). What cannot be done is refused before anything is
+//! sent, with 08000022h where the state forbids it and 06090030h where the value does;
+//! the reason stands in 2002h.
+//!
+//! | bits of 2002h | |
+//! |---|---|
+//! | 31..24 | axis, counted from 1; FFh: none |
+//! | 23..16 | reason, see [`Panel`] |
+//! | 15..0 | detail |
+
+use super::mode::Mode;
+use super::program::{AxisMove, PlanError};
+use super::{Director, FaultCause, Group, GroupConfig, GroupEvent, GroupState, Order, Refusal};
+use crate::id::Address;
+use crate::od::Part;
+use crate::sdo::AbortCode;
+use crate::time::Duration;
+
+/// Group command.
+pub const COMMAND: u16 = 0x2000;
+/// Group state.
+pub const STATE: u16 = 0x2001;
+/// Last refusal.
+pub const REFUSAL: u16 = 0x2002;
+/// Axes of the command.
+pub const AXES: u16 = 0x2003;
+/// Target position of each axis.
+pub const TARGET: u16 = 0x2004;
+/// Profile velocity of each axis.
+pub const VELOCITY: u16 = 0x2005;
+/// Profile acceleration of each axis.
+pub const ACCELERATION: u16 = 0x2006;
+/// Profile jerk.
+pub const JERK: u16 = 0x2007;
+/// Mode of operation of each axis.
+pub const MODE: u16 = 0x2008;
+/// Actual position of each axis.
+pub const POSITION: u16 = 0x2009;
+/// Actual velocity of each axis.
+pub const ACTUAL_VELOCITY: u16 = 0x200A;
+/// Reference position of each axis.
+pub const REFERENCE: u16 = 0x200B;
+/// Following error of each axis.
+pub const FOLLOWING_ERROR: u16 = 0x200C;
+/// Statusword of each axis.
+pub const STATUSWORD: u16 = 0x200D;
+/// Fault of each axis.
+pub const FAULT: u16 = 0x200E;
+/// Program.
+pub const PROGRAM: u16 = 0x200F;
+/// Program step.
+pub const STEP: u16 = 0x2010;
+
+/// Bytes that a downloaded program may have.
+pub const PROGRAM_BYTES: usize = 512;
+/// The longest that a search for home, ordered by 2000h, may take.
+const HOMING: Duration = Duration::from_millis(60_000);
+/// No axis.
+const NONE: u8 = u8::MAX;
+
+/// Why a command was refused: bits 23..16 of 2002h.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+enum Reason {
+    /// The state of the group forbids it; detail: the state.
+    State = 1,
+    /// No TPDO of the axis in this cycle.
+    NotFresh = 2,
+    /// The axis turns; detail: rpm.
+    NotAtRest = 3,
+    /// The network is not ready.
+    Network = 4,
+    /// The axis is in another mode; detail: its mode.
+    WrongMode = 5,
+    /// The drive does not have the mode (6502h); detail: the mode.
+    NoSuchMode = 6,
+    /// The last command is not carried out yet.
+    Busy = 7,
+    /// There is no such command or axis; detail: what was written.
+    Unknown = 8,
+    /// A value of the move or of the program breaks a limit.
+    Limit = 9,
+}
+
+/// What clients have set, and what they are told. Reasons of refusals (2002h): 1 not in
+/// this state of the group (detail: the state), 2 no TPDO of the axis, 3 the axis turns
+/// (rpm), 4 network not ready, 5 axis in another mode (its mode), 6 the drive lacks the
+/// mode (the mode), 7 the last command is not carried out yet, 8 no such command or axis
+/// (what was written), 9 a move or program breaks a limit (of a program: the step).
+#[derive(Debug)]
+pub struct Panel<const N: usize> {
+    config: &'static GroupConfig<N>,
+    command: u8,
+    refusal: u32,
+    axes: u32,
+    jerk: u32,
+    moves: [AxisMove; N],
+    modes: [Mode; N],
+    faults: [u32; N],
+    /// Axes whose mode is to be ordered as soon as the group stands by.
+    changing: u32,
+    program: &'static mut [u8],
+    /// Bytes of the program that was taken; 0: none was.
+    length: usize,
+    /// A program is being written.
+    loading: bool,
+}
+
+/// No part in a move.
+const AT_REST: AxisMove = AxisMove {
+    target: 0,
+    velocity: 0,
+    acceleration: 0,
+    deceleration: 0,
+    set: 0,
+};
+
+impl<const N: usize> Panel<N> {
+    /// All axes, no program; `program` is room for one.
+    pub fn new(config: &'static GroupConfig<N>, program: &'static mut [u8]) -> Panel<N> {
+        Panel {
+            config,
+            command: 0,
+            refusal: 0,
+            axes: Self::ALL,
+            jerk: 0,
+            moves: [AT_REST; N],
+            modes: [Mode::ProfileVelocity; N],
+            faults: [0; N],
+            changing: 0,
+            program,
+            length: 0,
+            loading: false,
+        }
+    }
+
+    const ALL: u32 = (1 << N) - 1;
+
+    /// The program that was downloaded last.
+    pub fn program(&self) -> Option<&[u8]> {
+        match self.length {
+            0 => None,
+            length => self.program.get(..length),
+        }
+    }
+
+    /// The value of an entry.
+    pub fn get(&self, at: Address, group: &Group<N>, director: &Director<N>) -> u32 {
+        match at.index.0 {
+            COMMAND => self.command.into(),
+            STATE => group.state() as u32,
+            REFUSAL => self.refusal,
+            AXES => self.axes,
+            JERK => self.jerk,
+            STEP => director.step().into(),
+            index => self.of_axis(index, usize::from(at.sub.0).wrapping_sub(1), group),
+        }
+    }
+
+    fn of_axis(&self, index: u16, axis: usize, group: &Group<N>) -> u32 {
+        let (Some(part), Some(view)) = (self.moves.get(axis), group.view(axis)) else {
+            return 0;
+        };
+        let signed = match index {
+            TARGET => part.target,
+            VELOCITY => return part.velocity,
+            ACCELERATION => return part.acceleration,
+            MODE => view.mode.code().into(),
+            POSITION => view.feedback.position,
+            ACTUAL_VELOCITY => view.feedback.velocity,
+            REFERENCE => view.reference,
+            FOLLOWING_ERROR => view.following_error,
+            STATUSWORD => return view.feedback.statusword.into(),
+            _ => return self.faults.get(axis).copied().unwrap_or(0),
+        };
+        signed as u32
+    }
+
+    /// Writes an entry.
+    ///
+    /// # Errors
+    /// 08000022h or 06090030h, and why in 2002h.
+    pub fn set(
+        &mut self,
+        at: Address,
+        value: u32,
+        group: &mut Group<N>,
+        director: &mut Director<N>,
+    ) -> Result<(), AbortCode> {
+        let axis = usize::from(at.sub.0).wrapping_sub(1);
+        match at.index.0 {
+            COMMAND => {
+                let done = self.order(value, group, director);
+                self.note(done)?;
+                self.command = value as u8;
+                return Ok(());
+            }
+            AXES if value & !Self::ALL == 0 => self.axes = value,
+            AXES => return self.note(Err(Refused::new(NONE, Reason::Unknown, value))),
+            JERK => self.jerk = value,
+            MODE => {
+                let modes = self.config.axes.get(axis).map_or(0, |axis| axis.modes);
+                let mode = Mode::of(value as i8).filter(|mode| mode.is_in(modes));
+                let (Some(mode), Some(place)) = (mode, self.modes.get_mut(axis)) else {
+                    let code = u32::from(value as u8);
+                    return self.note(Err(Refused::new(axis as u8, Reason::NoSuchMode, code)));
+                };
+                *place = mode;
+            }
+            index => {
+                if let Some(part) = self.moves.get_mut(axis) {
+                    match index {
+                        TARGET => part.target = value as i32,
+                        VELOCITY => part.velocity = value,
+                        _ => (part.acceleration, part.deceleration) = (value, value),
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn order(
+        &mut self,
+        command: u32,
+        group: &mut Group<N>,
+        director: &mut Director<N>,
+    ) -> Result<(), Refused> {
+        let (axes, state) = (self.axes, group.state());
+        let order = match command {
+            0 => return Ok(()),
+            1 => Order::Enable,
+            2 => Order::Disable,
+            3 => Order::Release,
+            4 => Order::Stop,
+            5 => Order::Halt,
+            6 => Order::QuickStop,
+            7 => Order::Reset,
+            8 => Order::Home {
+                axes,
+                limit: self.config.cycles(HOMING),
+            },
+            9 => {
+                if state != GroupState::Standby {
+                    return Err(Refusal::NotIn(state).into());
+                }
+                self.changing = axes;
+                return self.change_modes(group);
+            }
+            10 => {
+                let parts = core::array::from_fn(|n| {
+                    let part = self.moves.get(n).copied();
+                    part.filter(|_| axes >> n & 1 != 0)
+                });
+                return Ok(director.go(group, &parts, false, self.jerk)?);
+            }
+            11 | 12 => {
+                // 11 where the group is released already, 12 where it is not.
+                if self.loading || (command == 11) != (state == GroupState::Moving) {
+                    return Err(Refusal::NotIn(state).into());
+                }
+                return Ok(director.run(group)?);
+            }
+            _ => return Err(Refused::new(NONE, Reason::Unknown, command)),
+        };
+        Ok(group.order(order)?)
+    }
+
+    /// Orders the modes that are still to be changed: those of one kind together, one
+    /// kind after the other.
+    fn change_modes(&mut self, group: &mut Group<N>) -> Result<(), Refused> {
+        let first = self.changing.trailing_zeros() as usize;
+        let Some(&mode) = self.modes.get(first) else {
+            return Ok(());
+        };
+        let mut axes = 0;
+        for (n, other) in self.modes.iter().enumerate() {
+            if *other == mode {
+                axes |= self.changing & 1 << n;
+            }
+        }
+        match group.order(Order::SetMode { axes, mode }) {
+            Ok(()) => self.changing &= !axes,
+            Err(Refusal::Busy) => {}
+            Err(why) => {
+                self.changing = 0;
+                return Err(why.into());
+            }
+        }
+        Ok(())
+    }
+
+    /// Goes on with what takes several steps of the group.
+    pub fn poll(&mut self, group: &mut Group<N>) {
+        if self.changing == 0 {
+            return;
+        }
+        match group.state() {
+            GroupState::Standby => {
+                let done = self.change_modes(group);
+                // Nobody waits for the answer.
+                let _ = self.note(done);
+            }
+            GroupState::ModeChange => {}
+            _ => self.changing = 0,
+        }
+    }
+
+    /// Takes note of what the group reports: the first fault of each axis.
+    pub fn on_event(&mut self, event: &GroupEvent) {
+        match *event {
+            GroupEvent::Fault {
+                axis: Some(axis),
+                ref cause,
+            } => {
+                if let Some(fault @ 0) = self.faults.get_mut(usize::from(axis)) {
+                    *fault = code(cause);
+                }
+            }
+            GroupEvent::State {
+                to: GroupState::Enabling,
+                ..
+            } => self.faults = [0; N],
+            _ => {}
+        }
+    }
+
+    /// Takes a part of a program, 200Fh: in standby, while none runs. What was
+    /// downloaded before is gone as soon as the first part comes.
+    ///
+    /// # Errors
+    /// 08000022h in another state, 06070012h if it is too long, 06090030h if it cannot
+    /// be run, and why in 2002h.
+    pub fn write(
+        &mut self,
+        part: &Part<'_>,
+        group: &Group<N>,
+        director: &Director<N>,
+    ) -> Result<(), AbortCode> {
+        let state = group.state();
+        if state != GroupState::Standby || director.step() != 0 {
+            return self.note(Err(Refusal::NotIn(state).into()));
+        }
+        self.length = 0;
+        self.loading = true;
+        let from = part.offset as usize;
+        let to = from + part.data.len();
+        let size = part.size.map_or(to, |size| size as usize);
+        let room = self.program.get_mut(from..to);
+        let (Some(room), true) = (room, size <= PROGRAM_BYTES) else {
+            self.cancel();
+            return Err(AbortCode::TOO_LONG);
+        };
+        room.copy_from_slice(part.data);
+        if part.last {
+            self.loading = false;
+            let bytes = self.program.get(..to).unwrap_or_default();
+            let checked = super::format::check(bytes, self.config);
+            self.note(
+                checked.map_err(|error| Refused::new(NONE, Reason::Limit, error.step.into())),
+            )?;
+            self.length = to;
+        }
+        Ok(())
+    }
+
+    /// The download of a program was ended.
+    pub fn cancel(&mut self) {
+        self.loading = false;
+    }
+
+    /// Keeps the reason of a refusal.
+    fn note(&mut self, done: Result<(), Refused>) -> Result<(), AbortCode> {
+        done.map_err(|refused| {
+            self.refusal = refused.why;
+            refused.code
+        })
+    }
+}
+
+/// What was refused: 2002h, and what the client is told.
+#[derive(Clone, Copy, Debug)]
+struct Refused {
+    why: u32,
+    code: AbortCode,
+}
+
+impl Refused {
+    const fn new(axis: u8, reason: Reason, detail: u32) -> Refused {
+        let axis = if axis == NONE { NONE } else { axis + 1 };
+        Refused {
+            why: (axis as u32) << 24 | (reason as u32) << 16 | detail & u16::MAX as u32,
+            code: match reason {
+                Reason::NoSuchMode | Reason::Unknown | Reason::Limit => AbortCode::VALUE_RANGE,
+                _ => AbortCode::DEVICE_STATE,
+            },
+        }
+    }
+}
+
+impl From<Refusal> for Refused {
+    fn from(refusal: Refusal) -> Refused {
+        let (axis, reason, detail) = match refusal {
+            Refusal::NotFresh { axis } => (axis, Reason::NotFresh, 0),
+            Refusal::NotAtRest { axis, velocity } => {
+                (axis, Reason::NotAtRest, velocity.unsigned_abs())
+            }
+            Refusal::WrongMode { axis, mode } => (axis, Reason::WrongMode, mode as u32),
+            Refusal::ModeNotSupported { axis, mode, .. } => (axis, Reason::NoSuchMode, mode as u32),
+            Refusal::Program(PlanError::OutOfLimits { axis, .. } | PlanError::TooLong { axis }) => {
+                (axis, Reason::Limit, 0)
+            }
+            Refusal::NetworkNotReady => (NONE, Reason::Network, 0),
+            Refusal::NotIn(state) | Refusal::NotInStandby(state) => {
+                (NONE, Reason::State, state as u32)
+            }
+            Refusal::Busy | Refusal::StopRequested => (NONE, Reason::Busy, 0),
+        };
+        Refused::new(axis, reason, detail)
+    }
+}
+
+/// What stopped the group: bits 31..16 of 200Eh the cause, counted in the order of
+/// [`FaultCause`] from 1, below it a detail.
+fn code(cause: &FaultCause) -> u32 {
+    let (number, detail) = match *cause {
+        FaultCause::DriveFault { status } => (1, status.0),
+        FaultCause::LeftEnabled { status } => (2, status.0),
+        FaultCause::NotEnabled(_) => (3, 0),
+        FaultCause::TpdoMissing { cycles } => (4, cycles.into()),
+        FaultCause::FollowingError { error, .. } => (5, short(error)),
+        FaultCause::NotArrived { error } => (6, short(error)),
+        FaultCause::Program(_) => (7, 0),
+        FaultCause::HeartbeatLost => (8, 0),
+        FaultCause::Emergency { code } => (9, code),
+        FaultCause::LeftOperational => (10, 0),
+        FaultCause::NetworkLost => (11, 0),
+        FaultCause::DriveError { status } => (12, status.0),
+        FaultCause::NotDone { mode } => (13, mode as u16),
+        FaultCause::ModeNotConfirmed { mode } => (14, mode as u16),
+        FaultCause::PathDry => (15, 0),
+    };
+    number << 16 | u32::from(detail)
+}
+
+/// A number of increments, as far as 16 bits hold it.
+fn short(increments: i32) -> u16 {
+    increments.unsigned_abs().min(u16::MAX.into()) as u16
+}
