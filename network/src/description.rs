@@ -17,6 +17,8 @@ pub(crate) struct Description {
     pub(crate) bus: BTreeMap<Spanned<String>, Spanned<Bus>>,
     #[serde(default)]
     pub(crate) liveness: Liveness,
+    #[serde(default)]
+    pub(crate) group: Group,
     pub(crate) device: BTreeMap<Spanned<String>, Spanned<Device>>,
     #[serde(default)]
     pub(crate) node: Vec<Spanned<Node>>,
@@ -59,6 +61,13 @@ pub(crate) struct Bus {
 pub(crate) struct Liveness {
     pub(crate) by: Option<Spanned<String>>,
     pub(crate) missing_tpdos: Option<Spanned<i64>>,
+}
+
+/// `[group]`
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Group {
+    pub(crate) program: Option<Spanned<String>>,
 }
 
 /// `[device.NAME]`
@@ -104,6 +113,7 @@ pub(crate) struct Axis {
     pub(crate) mode: Option<Spanned<String>>,
     pub(crate) increments_per_turn: Option<Spanned<i64>>,
     pub(crate) gear: Option<Spanned<Vec<i64>>>,
+    pub(crate) units_per_turn: Option<Spanned<i64>>,
     pub(crate) max_speed: Option<Spanned<i64>>,
     pub(crate) max_acceleration: Option<Spanned<i64>>,
     pub(crate) quick_stop: Option<Spanned<i64>>,
@@ -146,18 +156,28 @@ impl Description {
         match toml::from_str(source.text()) {
             Ok(description) => Some(description),
             Err(error) => {
-                let span = error.span().unwrap_or(0..0);
-                let place = match error.span() {
-                    Some(_) => Place::at(source, &span),
-                    None => Place::file(source),
-                };
-                let value = offending(source, &span);
-                let (rule, suggestion) = words(error.message(), &value);
-                problems.error(&place, value, rule, suggestion);
+                malformed(source, &error, "docs/network.md", problems);
                 None
             }
         }
     }
+}
+
+/// Tells what is wrong with the form of a file that `reference` explains.
+pub(crate) fn malformed(
+    source: &Source,
+    error: &toml::de::Error,
+    reference: &str,
+    problems: &mut Problems,
+) {
+    let span = error.span().unwrap_or(0..0);
+    let place = match error.span() {
+        Some(_) => Place::at(source, &span),
+        None => Place::file(source),
+    };
+    let value = offending(source, &span);
+    let (rule, suggestion) = words(error.message(), &value, reference);
+    problems.error(&place, value, rule, suggestion);
 }
 
 /// What the span of an error shows: its first line.
@@ -174,7 +194,7 @@ fn offending(source: &Source, span: &Range<usize>) -> String {
 }
 
 /// The reader's message as a rule and a suggestion.
-fn words(message: &str, value: &str) -> (String, String) {
+fn words(message: &str, value: &str, reference: &str) -> (String, String) {
     let message = message.lines().collect::<Vec<_>>().join("; ");
     let known = || message.split('`').skip(3).step_by(2);
     let suggestion = if message.starts_with("unknown field") {
@@ -186,9 +206,9 @@ fn words(message: &str, value: &str) -> (String, String) {
             ),
         }
     } else if let Some(field) = message.strip_prefix("missing field ") {
-        format!("add {field}; docs/network.md says what it means")
+        format!("add {field}; {reference} says what it means")
     } else if message.starts_with("invalid type") {
-        "write the value as docs/network.md has it".to_string()
+        format!("write the value as {reference} has it")
     } else {
         "see https://toml.io for how this is written".to_string()
     };

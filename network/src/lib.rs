@@ -17,6 +17,7 @@ pub mod model;
 pub mod object;
 pub mod plan;
 mod problem;
+pub mod program;
 mod resolve;
 pub mod s1;
 mod source;

@@ -2,6 +2,7 @@
 
 use crate::layout::Layout;
 use crate::object::{Address, DataType, Direction};
+use crate::program::Program;
 use crate::timing::BitTiming;
 
 /// A machine: the master, and its nodes on one bus or several.
@@ -18,6 +19,8 @@ pub struct Machine {
     pub missing_tpdos: u8,
     /// The nodes, in the order of the axes.
     pub nodes: Vec<Node>,
+    /// What one release runs; `None`: the axes cannot be moved by the firmware.
+    pub program: Option<Program>,
 }
 
 impl Machine {
@@ -121,6 +124,8 @@ pub struct Node {
     pub gear: (u32, u32),
     /// 6502h as the EDS has it; `None`: it says nothing.
     pub supported_modes: Option<u32>,
+    /// User units of a turn of the load.
+    pub units_per_turn: Option<u32>,
     /// Start values in their order.
     pub start_values: Vec<Write>,
 }
@@ -162,6 +167,27 @@ const TARGETS: [(u16, u32); 3] = [
     (0x607A, 1 << 0 | 1 << 7),
     (0x6071, 1 << 9),
 ];
+
+impl Motor {
+    /// Increments and gear, speed and acceleration, limits and modes.
+    pub const fn new(
+        increments_per_turn: u32,
+        gear: (u32, u32),
+        max_speed: u32,
+        max_acceleration: u32,
+        limits: (i32, i32),
+        modes: u32,
+    ) -> Motor {
+        Motor {
+            increments_per_turn,
+            gear,
+            max_speed,
+            max_acceleration,
+            limits,
+            modes,
+        }
+    }
+}
 
 impl Node {
     /// Its motor, within the limits that are written to the drive. `None`

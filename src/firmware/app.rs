@@ -120,7 +120,7 @@ mod app {
     /// before anything can be late.
     #[init(local = [
         group: Group<AXES> = Group::ZERO,
-        director_place: MaybeUninit<Director<AXES>> = MaybeUninit::uninit(),
+        planning: Director<AXES> = Director::ZERO,
         axes_place: MaybeUninit<Axes> = MaybeUninit::uninit(),
         boot_place: MaybeUninit<NetworkBoot<AXES>> = MaybeUninit::uninit(),
         own_place: MaybeUninit<OwnNode> = MaybeUninit::uninit(),
@@ -191,7 +191,7 @@ mod app {
             Local {
                 period: board.period,
                 deadline: board.deadline,
-                director: new_director(cx.local.director_place),
+                director: configured(cx.local.planning),
                 events_to,
                 tick: board.tick,
                 microseconds: board.microseconds,
@@ -240,11 +240,9 @@ mod app {
         axes.write(Axes::new(NETWORK, group))
     }
 
-    #[inline(never)]
-    fn new_director(
-        place: &'static mut MaybeUninit<Director<AXES>>,
-    ) -> &'static mut Director<AXES> {
-        place.write(Director::new(&derived::GROUP))
+    fn configured(director: &'static mut Director<AXES>) -> &'static mut Director<AXES> {
+        director.configure(&derived::GROUP);
+        director
     }
 
     #[inline(never)]

@@ -16,10 +16,14 @@ use canmaster::{
     device::{Event, MasterError, Setting},
     motion::GroupEvent,
     nmt::State,
-    time::Instant,
+    time::{Duration, Instant},
 };
 use nucleo_g474re::reset_cause::ResetCause;
 use rtic::Mutex;
+
+/// So many cycles are longer than the period in any case.
+const CYCLES_MAX: u32 = 1000;
+const CYCLE_US: u32 = NETWORK.cycle.as_micros();
 
 /// The task with what it has.
 pub(crate) struct Configurator<'a> {
@@ -90,6 +94,10 @@ impl<'a> Configurator<'a> {
         roll::check_in(Task::SdoConfigurator);
         let boots = self.local.boot.next_deadline().filter(|_| !held);
         let mut next = self.now() + design::CONFIGURATOR_PERIOD;
+        // 0 wraps: nothing is waited for.
+        let patience = self.local.director.patience().wrapping_sub(1).min(CYCLES_MAX) + 1;
+        let motion = self.now() + Duration::from_micros(patience * CYCLE_US);
+        next = motion.min(next);
         for deadline in [boots, self.local.own.device.next_deadline(), tested] {
             next = deadline.map_or(next, |deadline| deadline.min(next));
         }
@@ -108,8 +116,10 @@ impl<'a> Configurator<'a> {
             (refused, director.look(axes.group, &PROGRAM))
         });
         if plan {
-            director.think();
-            self.shared.axes.lock(|axes| director.act(axes.group));
+            director.think(&PROGRAM);
+            self.shared
+                .axes
+                .lock(|axes| director.act(axes.group, &PROGRAM));
         }
         let refused = refused.map(GroupEvent::ReleaseRefused);
         for event in [refused, director.take_event()].into_iter().flatten() {

@@ -4,7 +4,7 @@
 use canmaster::{
     design,
     master::{AxisPdos, TPDOS_PER_AXIS},
-    motion::{GroupConfig, Program, experiment},
+    motion::{GroupConfig, experiment},
     sync::SyncLimits,
 };
 use nucleo_g474re::can::{BitTiming, Controller};
@@ -16,7 +16,7 @@ mod generated {
 
 pub(crate) use generated::{
     AFTER_SYNC_US, AXES, AXIS_BUSES, BUS_PERIPHERALS, BUSES, HEARTBEATS_IN_OPERATIONAL, NETWORK,
-    ONE_PLANNED, RAMPS_ON_CHANGE, RPDOS_AFTER_SYNC, RPDOS_US, SDO_EVERY, SDO_NEXT_CYCLE,
+    ONE_PLANNED, PROGRAM, RAMPS_ON_CHANGE, RPDOS_AFTER_SYNC, RPDOS_US, SDO_EVERY, SDO_NEXT_CYCLE,
     TPDO_DEADLINE_US,
 };
 use generated::{BUS_BIT_TIMINGS, SDO_FROM_US, SDO_UNTIL_US};
@@ -127,15 +127,6 @@ pub(crate) const SYNC_LIMITS: SyncLimits = SyncLimits {
 
 /// Frames that may wait for a transmit buffer.
 pub(crate) const TX_QUEUE: usize = design::tx_queue(AXES);
-
-const PROGRAM_BYTES: usize = Program::<AXES>::len_of(2, 1);
-
-/// What a press of the button runs.
-pub(crate) static PROGRAM: [u8; PROGRAM_BYTES] = Program {
-    name: "pairs, there and back",
-    steps: &experiment::steps(&generated::MOTORS, NETWORK.cycle),
-}
-.bytes();
 
 /// The axes as the group leads them.
 pub(crate) static GROUP: GroupConfig<AXES> = experiment::group(

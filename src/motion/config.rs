@@ -2,7 +2,7 @@
 
 use crate::motion::mode::Mode;
 use crate::motion::position_control::Tuning;
-use crate::motion::program::{Limit, PlanError};
+use crate::motion::program::{Fault, PlanError};
 use crate::motion::scale::Scale;
 use crate::time::Duration;
 
@@ -41,11 +41,9 @@ impl AxisConfig {
         let (lower, upper) = self.travel;
         let end = if target < 0 { lower } else { upper };
         if target.unsigned_abs() > end.unsigned_abs() {
-            return Err(PlanError::OutOfLimits {
+            return Err(PlanError {
                 axis,
-                limit: Limit::Target,
-                value: target,
-                allowed: end.unsigned_abs(),
+                ..PlanError::whole(Fault::Target, target as u32, end as u32)
             });
         }
         Ok(())
@@ -94,11 +92,5 @@ impl<const N: usize> GroupConfig<N> {
         let cycle = self.cycle.as_micros();
         time.as_micros()
             .div_ceil(if cycle == 0 { 1 } else { cycle })
-    }
-
-    /// The units of an axis, counted from 0; of the first if there is none.
-    pub(in crate::motion) fn scale(&self, axis: u8) -> Scale {
-        let axis = self.axes.get(usize::from(axis)).or(self.axes.first());
-        axis.map_or(Scale::new(1, self.cycle), |axis| axis.scale)
     }
 }

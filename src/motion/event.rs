@@ -1,7 +1,6 @@
 //! What a group reports, with the facts for a log.
 
 use crate::cia402::{State, StatusWord, Timeout};
-use crate::motion::director::format::ProgramError;
 use crate::motion::mode::Mode;
 use crate::motion::program::PlanError;
 use crate::words::in_words;
@@ -103,8 +102,6 @@ pub enum FaultCause {
         /// Target minus actual position, increments.
         error: i32,
     },
-    /// A step of the program cannot be carried out from where the axes stand.
-    Program(PlanError),
     /// The drive's heartbeat stopped.
     HeartbeatLost,
     /// The drive sent an emergency message with a fault reaction.
@@ -157,7 +154,6 @@ in_words!(FaultCause {
     FaultCause::NotArrived { error } => (
         "did not arrive: {} increments short of the target", error
     ),
-    FaultCause::Program(error) => ("{}", error),
     FaultCause::HeartbeatLost => ("heartbeat lost: check the cable and the drive's supply"),
     FaultCause::Emergency { code } => ("emergency {:#06x}", code),
     FaultCause::LeftOperational => ("the node left NMT operational"),
@@ -274,7 +270,7 @@ pub enum GroupEvent {
     /// The program ran through; the group is in standby again.
     ProgramDone,
     /// The program cannot go on; the group stops.
-    ProgramFailed(ProgramError),
+    ProgramFailed(PlanError),
     /// A move cannot be made; what was commanded before goes on.
     MoveRefused(PlanError),
     /// A fault stops the group, or came on top of one.

@@ -1,21 +1,9 @@
-//! The motion program of the firmware: motors in pairs, there and back.
+//! What the firmware leads: motors as the network describes them, as a group.
 //!
-//! Each pair gets one command and must start and stop in step: of six axes 1
-//! and 3, 2 and 4, 5 and 6, each pair with its own target, speed and ramps. There,
-//! a pause, and back. More axes repeat this by sixes; of what is left over, two
-//! are a pair and an odd one goes alone.
-//!
-//! The final decelerations are chosen so that the moment at which an axis falls
-//! below 5 rpm (stopped, by the project's definition) lies on the reference's
-//! ramp: at 800 rpm/s it is 6 ms before the end of the ramp, and the tail of a
-//! velocity loop of 10 ms, 8 rpm when the ramp ends, is cut by the advance.
-//!
-//! Everything is worked out by the compiler: [`steps`], [`group`] and
-//! [`Program::bytes`] are for statics.
+//! [`group`] is worked out by the compiler, for a static.
 
 use super::mode::Mode;
 use super::position_control::Tuning;
-use super::program::{AxisMove, Program, Step};
 use super::{AxisConfig, GroupConfig, Scale};
 use crate::time::Duration;
 
@@ -77,45 +65,29 @@ impl Motor {
     const fn room(&self) -> (i64, i64) {
         let (lower, upper) = self.limits;
         let margin = self.following_error() as i64;
-        let far = TRAVEL_MAX as i64 * self.increments_per_turn as i64;
         (
-            between(lower as i64 + margin, -far, 0),
-            between(upper as i64 - margin, 0, far),
+            between(lower as i64 + margin, -TRAVEL_MAX, 0),
+            between(upper as i64 - margin, 0, TRAVEL_MAX),
         )
-    }
-
-    /// What `turns` of the load come to, in increments; if there is more room on
-    /// the other side of home than this way, that way.
-    const fn target(&self, turns: i32) -> i32 {
-        let motor = turns as i64 * self.increments_per_turn as i64 * self.gear.0 as i64;
-        let increments = motor / self.gear.1 as i64;
-        let (least, most) = self.room();
-        let (there, other) = (
-            between(increments, least, most),
-            between(-increments, least, most),
-        );
-        if there.abs() >= other.abs() {
-            there as i32
-        } else {
-            other as i32
-        }
     }
 }
 
-/// 20 % above the fastest move, rpm: room for the position loop.
-const VELOCITY_MAX: u32 = 2200;
+/// Of an axis without another limit, rpm.
+const VELOCITY_MAX: u32 = 10_000;
 /// Of a stop, if the motors can, rpm/s.
 const STOP_DECELERATION: u32 = 3000;
 /// The drives' ramps at least, rpm/s.
 const RAMP_MIN: u32 = 1000;
-/// Twice the steepest ramp of the program, rpm/s.
-const ACCELERATION_MAX: u32 = 4000;
+/// Of an axis without another limit, rpm/s.
+const ACCELERATION_MAX: u32 = 100_000;
+/// The steepest that a long cycle may be at all, rpm/s.
+const STEEPEST: u32 = 4000;
 /// The drives' velocity loops take that long, microseconds; a longer cycle is long.
 const LONG_US: u32 = 10_000;
 /// Rated torque, per mille.
 const TORQUE_MAX: u16 = 1000;
-/// Turns of the motor from home.
-const TRAVEL_MAX: u32 = 1000;
+/// Increments from home: from end to end it is less than 2^31.
+const TRAVEL_MAX: i64 = (1 << 30) - 1;
 
 const fn least(a: u32, b: u32) -> u32 {
     if a < b { a } else { b }
@@ -131,90 +103,13 @@ const fn between(x: i64, least: i64, most: i64) -> i64 {
     }
 }
 
-/// What one pair does in one move: turns, rpm, rpm/s up, rpm/s down.
-struct Part(i32, u32, u32, u32);
-
-/// Axes of a pattern, and its pairs.
-const AXES: usize = 6;
-const PAIRS: u8 = 3;
-/// There.
-const THERE: [Part; PAIRS as usize] = [
-    Part(20, 1200, 1500, 800),
-    Part(-16, 900, 1000, 600),
-    Part(30, 1500, 2000, 1000),
-];
-/// And back.
-const BACK: [Part; PAIRS as usize] = [
-    Part(0, 1000, 1200, 700),
-    Part(0, 1100, 1500, 800),
-    Part(0, 1800, 1600, 900),
-];
-/// Between the two.
-const DWELL: Duration = Duration::from_millis(500);
-
-/// The part that an axis plays among `axes`, both counted from 0: which of a
-/// pattern's pairs it belongs to.
-const fn pair(axis: usize, axes: usize) -> u8 {
-    let two_left = axes - axis / AXES * AXES == 2;
-    match axis % AXES {
-        0 | 2 => 0,
-        1 if two_left => 0,
-        1 | 3 => 1,
-        _ => 2,
-    }
-}
-
-/// One move of all axes.
-const fn step<const N: usize>(
-    motors: &[Motor; N],
-    cycle: Duration,
-    parts: &[Part; PAIRS as usize],
-) -> Step<N> {
-    let [first, second, third] = parts;
-    let mut moves = [None; N];
-    let mut axis = 0;
-    let (mut left, mut given): (&mut [Option<AxisMove>], &[Motor]) = (&mut moves, motors);
-    while let (Some((part, more)), Some((motor, others))) =
-        (left.split_first_mut(), given.split_first())
-    {
-        let pair = pair(axis, N);
-        let Part(turns, velocity, acceleration, deceleration) = match pair {
-            0 => first,
-            1 => second,
-            _ => third,
-        };
-        let speed = least(VELOCITY_MAX, motor.max_speed);
-        let ramp = least(ACCELERATION_MAX, motor.max_acceleration) / 2;
-        let ramp = least(ramp, steepest(cycle));
-        *part = Some(AxisMove {
-            target: motor.target(*turns),
-            velocity: least(*velocity, speed - speed / 6),
-            acceleration: least(*acceleration, ramp),
-            deceleration: least(*deceleration, ramp),
-            set: (axis / AXES) as u8 * PAIRS + pair + 1,
-        });
-        (left, given) = (more, others);
-        axis += 1;
-    }
-    Step::Move(moves)
-}
-
-/// There, a pause, and back; see the module.
-pub const fn steps<const N: usize>(motors: &[Motor; N], cycle: Duration) -> [Step<N>; 3] {
-    [
-        step(motors, cycle, &THERE),
-        Step::Dwell(DWELL),
-        step(motors, cycle, &BACK),
-    ]
-}
-
 /// The steepest ramp, rpm/s. In a long cycle the speed changes by so little in one
 /// that the position loop, which sees it a cycle later, keeps up.
 const fn steepest(cycle: Duration) -> u32 {
     const RPM_PER_CYCLE: u32 = 12;
     const US_PER_S: u32 = 1_000_000;
     match cycle.as_micros() {
-        0..=LONG_US => ACCELERATION_MAX,
+        0..=LONG_US => STEEPEST,
         us => RPM_PER_CYCLE * US_PER_S / us,
     }
 }
@@ -265,13 +160,5 @@ pub const fn group<const N: usize>(
 
 const SAMPLE_CYCLE: Duration = Duration::from_millis(10);
 
-static SAMPLE_STEPS: [Step<6>; 3] = steps(&[Motor::SAMPLE; 6], SAMPLE_CYCLE);
-
 /// The group of six axes of the sample network, at a cycle of 10 ms.
 pub static GROUP: GroupConfig<6> = group(&[Motor::SAMPLE; 6], SAMPLE_CYCLE, 3);
-
-/// What they run.
-pub static PROGRAM: Program<6> = Program {
-    name: "pairs, there and back",
-    steps: &SAMPLE_STEPS,
-};

@@ -36,6 +36,6 @@ pub use group::{
     AxisCommand, AxisFeedback, AxisView, Group, Inputs, ModeWanted, Order, SetPoint, TooLate,
 };
 pub use position_control::{PositionControl, Tuning, Window};
-pub use program::{AxisMove, Limit, PlanError, Program, Step};
+pub use program::{AxisMove, Fault, PlanError};
 pub use scale::Scale;
 pub use speedometer::Speedometer;

@@ -10,7 +10,7 @@
 //! | 15..0 | detail |
 
 use super::mode::Mode;
-use super::program::{AxisMove, PlanError};
+use super::program::AxisMove;
 use super::{Director, FaultCause, Group, GroupConfig, GroupEvent, GroupState, Order, Refusal};
 use crate::id::Address;
 use crate::od::Part;
@@ -260,7 +260,10 @@ impl<const N: usize> Panel<N> {
                 if self.loading || (command == 11) != (state == GroupState::Moving) {
                     return Err(Refusal::NotIn(state).into());
                 }
-                return Ok(director.run(group)?);
+                return Ok(match command {
+                    11 => director.start(group),
+                    _ => director.run(group),
+                }?);
             }
             _ => return Err(Refused::new(NONE, Reason::Unknown, command)),
         };
@@ -408,9 +411,7 @@ impl From<Refusal> for Refused {
             }
             Refusal::WrongMode { axis, mode } => (axis, Reason::WrongMode, mode as u32),
             Refusal::ModeNotSupported { axis, mode, .. } => (axis, Reason::NoSuchMode, mode as u32),
-            Refusal::Program(PlanError::OutOfLimits { axis, .. } | PlanError::TooLong { axis }) => {
-                (axis, Reason::Limit, 0)
-            }
+            Refusal::Program(error) => (error.axis, Reason::Limit, error.value as u32),
             Refusal::NetworkNotReady => (NONE, Reason::Network, 0),
             Refusal::NotIn(state) | Refusal::NotInStandby(state) => {
                 (NONE, Reason::State, state as u32)
@@ -431,15 +432,14 @@ fn code(cause: &FaultCause) -> u32 {
         FaultCause::TpdoMissing { cycles } => (4, cycles.into()),
         FaultCause::FollowingError { error, .. } => (5, short(error)),
         FaultCause::NotArrived { error } => (6, short(error)),
-        FaultCause::Program(_) => (7, 0),
-        FaultCause::HeartbeatLost => (8, 0),
-        FaultCause::Emergency { code } => (9, code),
-        FaultCause::LeftOperational => (10, 0),
-        FaultCause::NetworkLost => (11, 0),
-        FaultCause::DriveError { status } => (12, status.0),
-        FaultCause::NotDone { mode } => (13, mode as u16),
-        FaultCause::ModeNotConfirmed { mode } => (14, mode as u16),
-        FaultCause::PathDry => (15, 0),
+        FaultCause::HeartbeatLost => (7, 0),
+        FaultCause::Emergency { code } => (8, code),
+        FaultCause::LeftOperational => (9, 0),
+        FaultCause::NetworkLost => (10, 0),
+        FaultCause::DriveError { status } => (11, status.0),
+        FaultCause::NotDone { mode } => (12, mode as u16),
+        FaultCause::ModeNotConfirmed { mode } => (13, mode as u16),
+        FaultCause::PathDry => (14, 0),
     };
     number << 16 | u32::from(detail)
 }

@@ -27,7 +27,7 @@ const ROUNDING: f32 = 1.0 + 1.0 / 131_072.0;
 pub type Knots = Vec<Knot, LEG_KNOTS>;
 
 /// One axis' part of a move, in increments and cycles; limits are positive.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Leg {
     /// Where it begins.
     pub from: Point,
@@ -41,25 +41,63 @@ pub struct Leg {
     pub deceleration: f32,
     /// Increments per cycle cubed; 0: no limit.
     pub jerk: f32,
-    /// Legs with the same number arrive together.
-    pub set: u8,
+    /// Legs with the same number arrive together; `None`: it is not moved.
+    pub set: Option<u8>,
+    /// What [`plan`] makes of it.
+    pub knots: Knots,
+    /// Its steepest slopes, increments per cycle squared: while its speed grows.
+    pub up: f32,
+    /// While it shrinks.
+    pub down: f32,
+    /// An axis that cannot brake before its target turns around: no farther than so
+    /// many increments from where it begins.
+    pub turn: f32,
+    /// What [`plan`] keeps of it meanwhile.
+    pub work: Work,
 }
 
 /// A leg as the search sees it.
-#[derive(Clone, Copy, Default)]
-struct Reduced {
-    way: f32,
-    from: f32,
-    velocity: f32,
-    acceleration: f32,
-    deceleration: f32,
-    /// Cycles before, in which its acceleration is led to 0.
+#[derive(Clone, Copy, Debug)]
+pub struct Work {
+    /// Cycles before the phases, in which the acceleration is led to 0.
     lead: u32,
+    /// What is left after them.
+    way: f32,
+    speed: f32,
+    /// Where the last of the knots ends.
+    at: Knot,
+}
+
+impl Leg {
+    /// An axis that is not moved.
+    pub const ZERO: Leg = Leg {
+        from: Point::at_rest(0),
+        target: 0,
+        velocity: 0.0,
+        acceleration: 0.0,
+        deceleration: 0.0,
+        jerk: 0.0,
+        set: None,
+        knots: Vec::new(),
+        up: 0.0,
+        down: 0.0,
+        turn: 0.0,
+        work: Work {
+            lead: 0,
+            way: 0.0,
+            speed: 0.0,
+            at: Knot {
+                cycles: 0,
+                position: 0,
+                velocity: 0,
+            },
+        },
+    };
 }
 
 /// Phases in cycles: all of it, speeding up, braking; what is left over is at
 /// constant velocity. Each ramp is led in and out in `jerk` cycles.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 struct Phases {
     total: u32,
     up: u32,
@@ -67,320 +105,215 @@ struct Phases {
     jerk: u32,
 }
 
-impl Reduced {
-    fn of(leg: &Leg, from: &Knot, lead: u32) -> Reduced {
-        let way = fixed::whole(leg.target).wrapping_sub(from.position);
-        Reduced {
-            lead,
-            way: fixed::float(way),
-            from: fixed::float(from.velocity),
-            velocity: leg.velocity,
-            acceleration: leg.acceleration,
-            deceleration: leg.deceleration,
-        }
-    }
-
-    /// The constant velocity that these phases ask for.
-    fn cruise(&self, phases: &Phases) -> f32 {
-        let weight = 2 * phases.total - phases.up - phases.down;
-        (2.0 * self.way - self.from * phases.up as f32) / weight as f32
-    }
-
-    /// How steep it may go from its velocity to `cruise`.
-    fn slope(&self, cruise: f32) -> f32 {
-        if cruise * self.from < 0.0 {
-            let steeper = self.acceleration > self.deceleration;
-            if steeper {
-                self.deceleration
-            } else {
-                self.acceleration
-            }
-        } else if cruise.abs() < self.from.abs() {
-            self.deceleration
-        } else {
-            self.acceleration
-        }
-    }
+fn greater(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }
 
-/// The members of a set: bit n for leg n.
-fn members(legs: &[Reduced], set: u32) -> impl Iterator<Item = &Reduced> {
-    let legs = legs.iter().enumerate();
-    legs.filter_map(move |(n, leg)| (set >> n & 1 != 0).then_some(leg))
-}
+impl Leg {
+    /// Begins with the phase that leads the acceleration to 0.
+    fn begin(&mut self) {
+        const THIRD: f32 = 1.0 / 3.0;
+        let Point {
+            position,
+            velocity,
+            acceleration,
+        } = self.from;
+        self.knots.clear();
+        self.work.at = Knot {
+            cycles: 0,
+            position,
+            velocity,
+        };
+        self.work.lead = 0;
+        if self.jerk > 0.0 && velocity != 0 {
+            self.work.lead = ceil(acceleration.abs() / self.jerk);
+            let time = self.work.lead as f32;
+            let gained = acceleration * time;
+            let way = velocity.wrapping_mul(i64::from(self.work.lead));
+            let way = way.wrapping_add(fixed::fixed(gained * time * THIRD));
+            self.add(self.work.lead, velocity + fixed::fixed(0.5 * gained), way);
+        }
+        let way = fixed::whole(self.target).wrapping_sub(self.work.at.position);
+        self.work.way = fixed::float(way);
+        self.work.speed = fixed::float(self.work.at.velocity);
+    }
 
-/// Phases of `total` cycles that keep the limits of all of `set`.
-#[inline(never)]
-fn fit(legs: &[Reduced], set: u32, total: u32, jerk: u32) -> Option<Phases> {
-    let shortest = (2 * jerk).max(1);
-    let mut phases = Phases {
-        total,
-        up: shortest,
-        down: shortest,
-        jerk,
-    };
-    for _ in 0..ROUNDS {
-        if phases.up + phases.down > total {
-            return None;
-        }
-        let (mut up, mut down) = (phases.up, phases.down);
-        for leg in members(legs, set) {
-            let cruise = leg.cruise(&phases);
-            if cruise.abs() > leg.velocity * ROUNDING {
-                return None;
-            }
-            let cycles = |speed: f32, slope: f32| ceil(speed.abs() / (slope * ROUNDING)) + jerk;
-            up = up.max(cycles(cruise - leg.from, leg.slope(cruise)));
-            down = down.max(cycles(cruise, leg.deceleration));
-        }
-        if (up, down) == (phases.up, phases.down) {
-            return Some(phases);
-        }
-        (phases.up, phases.down) = (up, down);
-    }
-    None
-}
-
-/// The shortest phases for `set` of at least `at_least` cycles.
-#[inline(never)]
-fn shortest(legs: &[Reduced], set: u32, at_least: u32, jerk: u32) -> Option<Phases> {
-    let mut low = at_least.max(1);
-    for leg in members(legs, set) {
-        low = low.max(ceil(leg.way.abs() / (leg.velocity * ROUNDING)));
-    }
-    let (mut high, mut best) = (low, None);
-    while best.is_none() {
-        if low > CYCLES_MAX {
-            return None;
-        }
-        best = fit(legs, set, high, jerk);
-        if best.is_none() {
-            low = high + 1;
-            high = CYCLES_MAX.min(2 * high).max(low);
-        }
-    }
-    while low < high {
-        let middle = low.midpoint(high);
-        match fit(legs, set, middle, jerk) {
-            None => low = middle + 1,
-            found => (high, best) = (middle, found),
-        }
-    }
-    best
-}
-
-/// Knots from where `out` ends on: to `velocity` in `cycles`, each end in `jerk`.
-fn ramp(at: &mut Knot, out: &mut Knots, velocity: i64, cycles: u32, jerk: u32) {
-    let from = at.velocity;
-    let mut push = |cycles: u32, velocity: i64, way: i64| {
+    /// A knot more.
+    #[inline(never)]
+    fn add(&mut self, cycles: u32, velocity: i64, way: i64) {
+        let at = &mut self.work.at;
         at.cycles = cycles;
         at.position = at.position.wrapping_add(way);
         at.velocity = velocity;
         if cycles > 0 {
             // There is room: a leg has no more.
-            let _ = out.push(*at);
+            let _ = self.knots.push(*at);
         }
-    };
-    let mean = |from: i64, to: i64, cycles: u32| ((from + to) >> 1).wrapping_mul(i64::from(cycles));
-    if jerk == 0 {
-        push(cycles, velocity, mean(from, velocity, cycles));
-        return;
     }
-    const SIXTH: u32 = 6;
-    let times = i64::from(jerk);
-    let gained = fixed::div(velocity - from, cycles - jerk).wrapping_mul(times);
-    let bend = fixed::div(gained, SIXTH).wrapping_mul(times);
-    let (led_in, led_out) = (from + (gained >> 1), velocity - (gained >> 1));
-    let middle = cycles - 2 * jerk;
-    push(jerk, led_in, from.wrapping_mul(times) + bend);
-    push(middle, led_out, mean(led_in, led_out, middle));
-    push(jerk, velocity, velocity.wrapping_mul(times) - bend);
+
+    /// To `velocity` in `cycles`, each end in `jerk`.
+    #[inline(never)]
+    fn ramp(&mut self, velocity: i64, cycles: u32, jerk: u32) {
+        const SIXTH: u32 = 6;
+        let from = self.work.at.velocity;
+        let times = i64::from(jerk);
+        let gained = fixed::div(velocity - from, cycles - jerk).wrapping_mul(times);
+        let bend = fixed::div(gained, SIXTH).wrapping_mul(times);
+        let (led_in, led_out) = (from + (gained >> 1), velocity - (gained >> 1));
+        let middle = cycles - 2 * jerk;
+        self.add(jerk, led_in, from.wrapping_mul(times) + bend);
+        let mean = (led_in + led_out) >> 1;
+        self.add(middle, led_out, mean.wrapping_mul(i64::from(middle)));
+        self.add(jerk, velocity, velocity.wrapping_mul(times) - bend);
+    }
+
+    /// The knots in these phases.
+    #[inline(never)]
+    fn lay(&mut self, phases: &Phases) {
+        let Phases {
+            total,
+            up,
+            down,
+            jerk,
+        } = *phases;
+        let target = fixed::whole(self.target);
+        let way = target.wrapping_sub(self.work.at.position);
+        // Twice what the constant velocity has to cover would not fit.
+        let cover = way.wrapping_sub((self.work.at.velocity >> 1).wrapping_mul(i64::from(up)));
+        let cruise = fixed::div(cover, 2 * total - up - down) << 1;
+        let (from, to) = (self.work.speed, fixed::float(cruise));
+        self.up = (to - from).abs() / (up - jerk) as f32;
+        self.down = to.abs() / (down - jerk) as f32;
+        self.turn = 0.0;
+        if from.abs() > to.abs() || from * to < 0.0 {
+            self.down = greater(self.down, self.up);
+        }
+        if from * to < 0.0 {
+            // The jerk keeps it going a little longer.
+            self.turn = 0.5 * from * (up as f32 * from / (from - to) + jerk as f32);
+        }
+        self.ramp(cruise, up, jerk);
+        self.ramp(cruise, total - up - down, 0);
+        self.ramp(0, down, jerk);
+        if let Some(last) = self.knots.last_mut() {
+            last.position = target;
+        }
+    }
 }
 
-/// The knots of `leg` in these phases.
+/// Phases of `total` cycles that keep the limits of all legs of `set`.
 #[inline(never)]
-fn knots(leg: &Leg, phases: &Phases, at: &mut Knot, out: &mut Knots) {
-    let Phases {
-        total,
-        up,
-        down,
-        jerk,
-    } = *phases;
-    let target = fixed::whole(leg.target);
-    let way = target.wrapping_sub(at.position);
-    // Twice what the constant velocity has to cover would not fit.
-    let cover = way.wrapping_sub((at.velocity >> 1).wrapping_mul(i64::from(up)));
-    let cruise = fixed::div(cover, 2 * total - up - down) << 1;
-    ramp(at, out, cruise, up, jerk);
-    let cycles = total - up - down;
-    if cycles > 0 {
-        at.cycles = cycles;
-        at.position = at
-            .position
-            .wrapping_add(cruise.wrapping_mul(i64::from(cycles)));
-        let _ = out.push(*at);
-    }
-    ramp(at, out, 0, down, jerk);
-    if let Some(last) = out.last_mut() {
-        last.position = target;
-    }
-}
-
-/// A leg that takes longer than [`CYCLES_MAX`] cycles.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TooLong {
-    /// Counted from 0.
-    pub leg: u8,
-}
-
-/// Plans `legs` into `out`, as many; where there is no leg there are no knots.
-/// Returns the cycles of the slowest.
-///
-/// # Errors
-/// [`TooLong`] for the first leg of the set that takes too long.
-pub fn plan(legs: &[Option<Leg>], out: &mut [Knots]) -> Result<u32, TooLong> {
-    let mut longest = 0;
-    let mut left = 0u32;
-    for (n, (leg, out)) in legs.iter().zip(&mut *out).enumerate() {
-        out.clear();
-        left |= u32::from(leg.is_some()) << n;
-    }
-    while left != 0 {
-        let first = left.trailing_zeros();
-        let number = legs
-            .get(first as usize)
-            .copied()
-            .flatten()
-            .map_or(0, |leg| leg.set);
-        let mut set = 0;
-        for (n, leg) in legs.iter().enumerate() {
-            let same = leg.is_some_and(|leg| leg.set == number);
-            set |= u32::from(same) << n;
+fn fit(legs: &[Leg], set: Option<u8>, total: u32, jerk: u32) -> Option<Phases> {
+    let shortest = (2 * jerk).max(1);
+    let (mut up, mut down) = (shortest, shortest);
+    for _ in 0..ROUNDS {
+        if up + down > total {
+            return None;
         }
-        left &= !set;
-        let cycles = plan_set(legs, set, out).ok_or(TooLong { leg: first as u8 })?;
-        longest = longest.max(cycles);
-    }
-    Ok(longest)
-}
-
-/// The most legs.
-const LEGS: usize = 16;
-
-fn plan_set(legs: &[Option<Leg>], set: u32, out: &mut [Knots]) -> Option<u32> {
-    let mut reduced = [Reduced::default(); LEGS];
-    let mut starts = [Knot::default(); LEGS];
-    let (mut jerk, mut moving, mut still) = (0, false, true);
-    for (n, leg) in legs.iter().enumerate() {
-        let (Some(leg), true) = (leg, set >> n & 1 != 0) else {
-            continue;
-        };
-        if leg.jerk > 0.0 {
-            let most = leg.acceleration.max(leg.deceleration);
-            jerk = jerk.max(ceil(most / leg.jerk).max(1));
-        }
-        moving |= leg.from.velocity != 0;
-        still &= leg.from.velocity == 0 && fixed::whole(leg.target) == leg.from.position;
-    }
-    if still {
-        return Some(0);
-    }
-    let timed = legs
-        .iter()
-        .zip(&mut reduced)
-        .zip(starts.iter_mut().zip(&mut *out));
-    for (n, ((leg, reduced), (start, out))) in timed.enumerate() {
-        let (Some(leg), true) = (leg, set >> n & 1 != 0) else {
-            continue;
-        };
-        let lead = if moving && leg.jerk > 0.0 {
-            ceil(leg.from.acceleration.abs() / leg.jerk)
-        } else {
-            0
-        };
-        *start = led_to_constant(&leg.from, lead, out);
-        *reduced = Reduced::of(leg, start, lead);
-    }
-    // In motion each has its own phases, and only the end is common.
-    let common = if moving {
-        own_phases(&reduced, set, jerk)?
-    } else {
-        shortest(&reduced, set, 1, jerk)?
-    };
-    for (n, ((leg, start), out)) in legs.iter().zip(&mut starts).zip(out).enumerate() {
-        let (Some(leg), true) = (leg, set >> n & 1 != 0) else {
-            continue;
-        };
-        let phases = if moving {
-            let lead = reduced.get(n).map_or(0, |leg| leg.lead);
-            fit(&reduced, 1 << n, common.total - lead, jerk)?
-        } else {
-            common
-        };
-        knots(leg, &phases, start, out);
-    }
-    Some(common.total)
-}
-
-/// Where the acceleration that `from` has is led to 0 in `cycles`.
-fn led_to_constant(from: &Point, cycles: u32, out: &mut Knots) -> Knot {
-    let mut at = Knot {
-        cycles,
-        position: from.position,
-        velocity: from.velocity,
-    };
-    if cycles > 0 {
-        const THIRD: f32 = 1.0 / 3.0;
-        let time = cycles as f32;
-        let gained = from.acceleration * time;
-        let way = from.velocity.wrapping_mul(i64::from(cycles));
-        at.position = at
-            .position
-            .wrapping_add(way + fixed::fixed(gained * time * THIRD));
-        at.velocity += fixed::fixed(0.5 * gained);
-        let _ = out.push(at);
-    }
-    at
-}
-
-/// The shortest time in which each of `set` can arrive by phases of its own.
-fn own_phases(legs: &[Reduced], set: u32, jerk: u32) -> Option<Phases> {
-    let mut common = Phases {
-        total: 1,
-        up: 0,
-        down: 0,
-        jerk,
-    };
-    loop {
-        let before = common.total;
-        for (n, leg) in legs.iter().enumerate() {
-            if set >> n & 1 != 0 {
-                let left = common.total.saturating_sub(leg.lead);
-                let own = match fit(legs, 1 << n, left, jerk) {
-                    None => shortest(legs, 1 << n, left, jerk)?,
-                    Some(fits) => fits,
-                };
-                common.total = common.total.max(own.total + leg.lead);
+        let weight = (2 * total - up - down) as f32;
+        let (so_far_up, so_far_down) = (up, down);
+        for leg in legs {
+            if leg.set != set {
+                continue;
             }
+            let from = leg.work.speed;
+            let cruise = (2.0 * leg.work.way - from * so_far_up as f32) / weight;
+            if cruise.abs() > leg.velocity * ROUNDING {
+                return None;
+            }
+            let mut slope = leg.acceleration;
+            let turns = cruise * from < 0.0 && slope > leg.deceleration;
+            if turns || (cruise * from >= 0.0 && cruise.abs() < from.abs()) {
+                slope = leg.deceleration;
+            }
+            let cycles = |speed: f32, slope: f32| ceil(speed.abs() / (slope * ROUNDING)) + jerk;
+            up = up.max(cycles(cruise - from, slope));
+            down = down.max(cycles(cruise, leg.deceleration));
         }
-        // None had to wait longer for another.
-        if common.total == before {
-            return Some(common);
+        if (up, down) == (so_far_up, so_far_down) {
+            return Some(Phases {
+                total,
+                up,
+                down,
+                jerk,
+            });
         }
-    }
-}
-
-/// Where a path that begins at `from` turns around on its way, in 2^-32
-/// increments: a leg that cannot brake before its target comes back.
-pub fn turning_point(from: &Point, knots: &[Knot]) -> Option<i64> {
-    let (mut position, mut speed) = (from.position, fixed::float(from.velocity));
-    for knot in knots {
-        let next = fixed::float(knot.velocity);
-        if speed * next < 0.0 {
-            let until_rest = 0.5 * knot.cycles as f32 * speed / (speed - next);
-            return Some(position.wrapping_add(fixed::fixed(speed * until_rest)));
-        }
-        (position, speed) = (knot.position, next);
     }
     None
+}
+
+/// The shortest phases for `set` of at least `at_least` cycles.
+fn shortest(legs: &[Leg], set: Option<u8>, at_least: u32, jerk: u32) -> Option<u32> {
+    let (mut low, mut high) = (at_least, at_least);
+    while fit(legs, set, high, jerk).is_none() {
+        low = high + 1;
+        high = 2 * low;
+        if low > CYCLES_MAX {
+            return None;
+        }
+    }
+    while low < high {
+        let middle = low.midpoint(high);
+        if fit(legs, set, middle, jerk).is_some() {
+            high = middle;
+        } else {
+            low = middle + 1;
+        }
+    }
+    Some(high)
+}
+
+/// Plans the legs: their knots and what goes with them.
+///
+/// # Errors
+/// The first leg, counted from 0, of a set that takes longer than [`CYCLES_MAX`]
+/// cycles.
+pub fn plan(legs: &mut [Leg]) -> Result<(), u8> {
+    for first in 0..legs.len() {
+        let (before, left) = legs.split_at(first);
+        let set = left.first().and_then(|leg| leg.set);
+        let done = before.iter().any(|leg| leg.set == set);
+        if set.is_some() && !done && plan_set(legs, set).is_none() {
+            return Err(first as u8);
+        }
+    }
+    Ok(())
+}
+
+#[inline(never)]
+fn plan_set(legs: &mut [Leg], set: Option<u8>) -> Option<()> {
+    let (mut jerk, mut moving) = (0, false);
+    for leg in legs.iter_mut() {
+        if leg.set == set {
+            leg.begin();
+            moving |= leg.from.velocity != 0;
+            if leg.jerk > 0.0 {
+                let most = greater(leg.acceleration, leg.deceleration);
+                jerk = jerk.max(ceil(most / leg.jerk));
+            }
+        }
+    }
+    // In motion each has its own phases, and only the end is common.
+    let group = |legs: &[Leg], n: usize| if moving { n..n + 1 } else { 0..legs.len() };
+    let (mut total, mut before) = (1u32, 0);
+    while total != before {
+        before = total;
+        for n in 0..legs.len() {
+            let leg = legs.get(n)?;
+            if leg.set == set {
+                let left = total.saturating_sub(leg.work.lead).max(1);
+                let own = shortest(legs.get(group(legs, n))?, set, left, jerk)?;
+                // None has to wait longer for another at the end.
+                total = total.max(own + leg.work.lead);
+            }
+        }
+    }
+    for n in 0..legs.len() {
+        let leg = legs.get(n)?;
+        if leg.set == set {
+            let phases = fit(legs.get(group(legs, n))?, set, total - leg.work.lead, jerk)?;
+            legs.get_mut(n)?.lay(&phases);
+        }
+    }
+    Some(())
 }

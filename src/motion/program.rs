@@ -1,12 +1,7 @@
-//! Motion programs: a constant table that one release runs through once.
+//! One axis' part of a move, and why a move or a program cannot be carried out.
 
-use super::format::VERSION;
-use super::path::Point;
-use super::plan::{self, Knots, Leg};
+use super::AxisConfig;
 use super::scale::Scale;
-use super::{AxisConfig, GroupConfig};
-use crate::sdo::Crc16;
-use crate::time::Duration;
 use crate::words::in_words;
 
 /// One axis' part of a move.
@@ -27,30 +22,35 @@ pub struct AxisMove {
     pub set: u8,
 }
 
-/// One step of a program.
+/// What of a move or a program is wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
 #[non_exhaustive]
-pub enum Step<const N: usize> {
-    /// The named axes start in the same SYNC; the step ends when all have
-    /// arrived. The others hold their positions.
-    Move([Option<AxisMove>; N]),
-    /// All axes hold their positions.
-    Dwell(Duration),
-}
-
-/// A motion program for `N` axes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Program<const N: usize> {
-    /// For logs and reports.
-    pub name: &'static str,
-    /// Run in order, once per release.
-    pub steps: &'static [Step<N>],
-}
-
-/// The quantity of a move that a bound of the axis forbids.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Limit {
+pub enum Fault {
+    /// Bytes of the program.
+    Length,
+    /// Version of the format.
+    Version,
+    /// Number of axes that it is made for.
+    Axes,
+    /// SYNC period that it is made for, microseconds.
+    Cycle,
+    /// CRC-16.
+    Checksum,
+    /// Kind of a step.
+    Step,
+    /// The axes of a step, bit n for axis n.
+    Members,
+    /// Mode of operation, as 6060h; allowed are those of 6502h.
+    Mode,
+    /// How deep a loop lies in others; below 1 one ends that did not begin.
+    Loop,
+    /// Points of a path, or cycles from one to the next.
+    Points,
+    /// Where a path begins, increments from home.
+    Begin,
+    /// What a path has left at its end: velocity, or way where it is repeated.
+    End,
     /// Highest speed, rpm.
     Velocity,
     /// Acceleration, rpm/s.
@@ -61,215 +61,112 @@ pub enum Limit {
     Target,
     /// Torque, per mille of the rated one.
     Torque,
+    /// Cycles of a move.
+    Time,
 }
 
-in_words!(Limit {
-    Limit::Velocity => ("velocity in rpm"),
-    Limit::Acceleration => ("acceleration in rpm/s"),
-    Limit::Deceleration => ("deceleration in rpm/s"),
-    Limit::Target => ("target in increments from home"),
-    Limit::Torque => ("torque in per mille"),
+#[cfg(feature = "defmt")]
+impl Fault {
+    const fn place(&self) -> u8 {
+        *self as u8
+    }
+}
+
+in_words!(Fault by Fault::place {
+    Fault::Length => ("length in bytes"),
+    Fault::Version => ("version of the format"),
+    Fault::Axes => ("number of axes"),
+    Fault::Cycle => ("SYNC period in us"),
+    Fault::Checksum => ("checksum"),
+    Fault::Step => ("kind of the step"),
+    Fault::Members => ("set of axes"),
+    Fault::Mode => ("mode of operation"),
+    Fault::Loop => ("depth of loops"),
+    Fault::Points => ("number of points or cycles"),
+    Fault::Begin => ("begin of the path in increments from home"),
+    Fault::End => ("end of the path"),
+    Fault::Velocity => ("velocity in rpm"),
+    Fault::Acceleration => ("acceleration in rpm/s"),
+    Fault::Deceleration => ("deceleration in rpm/s"),
+    Fault::Target => ("target in increments from home"),
+    Fault::Torque => ("torque in per mille"),
+    Fault::Time => ("time in cycles"),
 });
 
-/// Why a program cannot be run.
+/// Why a move or a program cannot be carried out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum PlanError {
-    /// A value of a move lies outside the limits of the axis.
-    OutOfLimits {
-        /// Axis, counted from 0.
-        axis: u8,
-        /// Which value.
-        limit: Limit,
-        /// What the program asks for.
-        value: i32,
-        /// Largest magnitude allowed on this side (0 itself is allowed for the
-        /// target only).
-        allowed: u32,
-    },
-    /// The move would take longer than the resolution of time allows.
-    TooLong {
-        /// Axis, counted from 0.
-        axis: u8,
-    },
+pub struct PlanError {
+    /// What is wrong.
+    pub fault: Fault,
+    /// Axis, counted from 0; [`NO_AXIS`](Self::NO_AXIS) where it is no matter of
+    /// one.
+    pub axis: u8,
+    /// Step of the program, counted from 1; 0: a single move, or the program as a
+    /// whole.
+    pub step: u16,
+    /// What is asked for.
+    pub value: i32,
+    /// Largest magnitude allowed, or the only value.
+    pub allowed: i32,
+}
+
+impl PlanError {
+    /// No single axis.
+    pub const NO_AXIS: u8 = u8::MAX;
+
+    /// Of no axis and no step.
+    pub(super) const fn whole(fault: Fault, value: u32, allowed: u32) -> PlanError {
+        PlanError {
+            fault,
+            axis: PlanError::NO_AXIS,
+            step: 0,
+            value: value as i32,
+            allowed: allowed as i32,
+        }
+    }
 }
 
 in_words!(PlanError {
-    PlanError::OutOfLimits { axis, limit, value, allowed } => (
-        "axis {}: {} is {}, at most {} allowed: change the program",
-        axis + 1, limit, value, allowed
+    PlanError { axis: PlanError::NO_AXIS, step, fault, value, allowed } => (
+        "step {}: {} is {}, allowed is {}", step, fault, value, allowed
     ),
-    PlanError::TooLong { axis } => (
-        "axis {}: the move takes too long: raise its velocity or accelerations", axis + 1
+    PlanError { axis, step, fault, value, allowed } => (
+        "step {}, axis {}: {} is {}, allowed is {}", step, axis + 1, fault, value, allowed
     ),
 });
 
 impl core::error::Error for PlanError {}
 
+/// `value`, a magnitude above 0, against the largest that is allowed.
+#[inline(never)]
+pub(super) fn within(axis: u8, fault: Fault, value: u32, allowed: u32) -> Result<(), PlanError> {
+    if value.wrapping_sub(1) < allowed {
+        return Ok(());
+    }
+    Err(PlanError {
+        axis,
+        ..PlanError::whole(fault, value, allowed)
+    })
+}
+
 impl AxisMove {
-    /// The leg of a path, from rest at 0; its target as it stands here.
-    pub(super) fn leg(&self, scale: Scale) -> Leg {
-        Leg {
-            target: self.target,
-            velocity: scale.velocity(self.velocity as f32),
-            acceleration: scale.acceleration(self.acceleration as f32),
-            deceleration: scale.acceleration(self.deceleration as f32),
-            set: self.set,
-            ..Leg::default()
-        }
+    /// The limits of a leg, in increments and cycles.
+    pub(super) fn limits(&self, scale: Scale) -> [f32; 3] {
+        [
+            scale.velocity(self.velocity as f32),
+            scale.acceleration(self.acceleration as f32),
+            scale.acceleration(self.deceleration as f32),
+        ]
     }
 
-    /// Checks the move against the limits of its axis, its target only if it is
-    /// `absolute`.
+    /// Checks all but the target against the limits of its axis.
     ///
     /// # Errors
     /// [`PlanError`] for the first value that breaks a limit.
-    pub fn keeps(&self, axis: u8, limits: &AxisConfig, absolute: bool) -> Result<(), PlanError> {
-        let checks = [
-            (Limit::Velocity, self.velocity, limits.velocity_max),
-            (
-                Limit::Acceleration,
-                self.acceleration,
-                limits.acceleration_max,
-            ),
-            (
-                Limit::Deceleration,
-                self.deceleration,
-                limits.acceleration_max,
-            ),
-        ];
-        for (limit, value, allowed) in checks {
-            if value == 0 || value > allowed {
-                return Err(PlanError::OutOfLimits {
-                    axis,
-                    limit,
-                    value: i32::try_from(value).unwrap_or(i32::MAX),
-                    allowed,
-                });
-            }
-        }
-        if absolute {
-            limits.reaches(axis, self.target)?;
-        }
-        Ok(())
+    pub fn keeps(&self, axis: u8, limits: &AxisConfig) -> Result<(), PlanError> {
+        let most = limits.acceleration_max;
+        within(axis, Fault::Velocity, self.velocity, limits.velocity_max)?;
+        within(axis, Fault::Acceleration, self.acceleration, most)?;
+        within(axis, Fault::Deceleration, self.deceleration, most)
     }
 }
-
-/// The axes that have a part: bit n for axis n.
-const fn axes<const N: usize>(moves: &[Option<AxisMove>; N]) -> u32 {
-    let (mut axes, mut bit) = (0, 1);
-    let mut left: &[Option<AxisMove>] = moves;
-    while let Some((part, others)) = left.split_first() {
-        if part.is_some() {
-            axes |= bit;
-        }
-        bit <<= 1;
-        left = others;
-    }
-    axes
-}
-
-/// Writes the lowest bytes of `value`; what is left behind them.
-const fn put(bytes: &mut [u8], value: u32, size: u8) -> &mut [u8] {
-    let (mut left, mut value, mut size) = (bytes, value, size);
-    while size > 0 {
-        let Some((byte, more)) = left.split_first_mut() else {
-            return &mut [];
-        };
-        *byte = value as u8;
-        (left, value, size) = (more, value >> u8::BITS, size - 1);
-    }
-    left
-}
-
-impl<const N: usize> Program<N> {
-    /// Bytes of a program with so many moves of all axes and so many dwells.
-    pub const fn len_of(moves: usize, dwells: usize) -> usize {
-        const FRAME: usize = 6;
-        const MOVE: usize = 8;
-        const PART: usize = 17;
-        const WAIT: usize = 5;
-        FRAME + moves * (MOVE + N * PART) + dwells * WAIT
-    }
-
-    /// The program as [`format`](crate::motion::format) has it; `BYTES` is to be
-    /// [`len_of`](Self::len_of) its steps.
-    pub const fn bytes<const BYTES: usize>(&self) -> [u8; BYTES] {
-        const MOVE: u32 = 1;
-        const WAIT: u32 = 2;
-        const FRAME: u32 = 6;
-        let mut bytes = [0; BYTES];
-        let mut left = put(&mut bytes, VERSION as u32, 1);
-        left = put(left, N as u32, 1);
-        left = put(left, BYTES as u32 - FRAME, 2);
-        let mut steps = self.steps;
-        while let Some((step, others)) = steps.split_first() {
-            left = match step {
-                Step::Dwell(time) => put(put(left, WAIT, 1), time.as_millis(), 4),
-                Step::Move(moves) => {
-                    left = put(put(left, MOVE, 2), axes(moves), 2);
-                    left = put(left, 0, 4);
-                    let mut parts: &[Option<AxisMove>] = moves;
-                    while let Some((part, more)) = parts.split_first() {
-                        if let Some(part) = part {
-                            left = put(left, part.target as u32, 4);
-                            left = put(left, part.velocity, 4);
-                            left = put(left, part.acceleration, 4);
-                            left = put(left, part.deceleration, 4);
-                            left = put(left, part.set as u32, 1);
-                        }
-                        parts = more;
-                    }
-                    left
-                }
-            };
-            steps = others;
-        }
-        if let Some((all, crc)) = bytes.split_last_chunk_mut() {
-            *crc = Crc16::new().update(all).get().to_le_bytes();
-        }
-        bytes
-    }
-
-    /// Checks every move against the limits in `config` and sums up how long one
-    /// run takes when it starts from home.
-    ///
-    /// The settling of an axis at each target is taken as the time allowed for
-    /// it at best; a disturbed axis may need longer, up to
-    /// [`GroupConfig::settle_timeout`] per move.
-    ///
-    /// # Errors
-    /// [`PlanError`] for the first move that cannot be carried out.
-    pub fn duration(&self, config: &GroupConfig<N>) -> Result<Duration, PlanError> {
-        let mut at = [0; N];
-        let mut cycles = 0u64;
-        for step in self.steps {
-            match step {
-                Step::Dwell(time) => cycles += u64::from(config.cycles(*time)),
-                Step::Move(moves) => {
-                    let mut legs = [None; N];
-                    let parts = moves.iter().zip(&mut legs).zip(&mut at).zip(&config.axes);
-                    for (axis, (((part, leg), at), limits)) in (0..).zip(parts) {
-                        let Some(part) = part else { continue };
-                        part.keeps(axis, limits, true)?;
-                        let from = core::mem::replace(at, part.target);
-                        *leg = Some(Leg {
-                            from: Point::at_rest(from),
-                            ..part.leg(config.scale(axis))
-                        });
-                    }
-                    let mut knots = [const { Knots::new() }; N];
-                    let longest = plan::plan(&legs, &mut knots);
-                    let longest = longest.map_err(|late| PlanError::TooLong { axis: late.leg })?;
-                    cycles += u64::from(longest) + SETTLING_CYCLES;
-                }
-            }
-        }
-        let us = cycles * u64::from(config.cycle.as_micros());
-        Ok(Duration::from_micros(u32::try_from(us).unwrap_or(u32::MAX)))
-    }
-}
-
-/// Cycles between the end of a move's reference and the next step when nothing
-/// disturbs the axes: delay of the loop, last increments, confirmation, planning.
-const SETTLING_CYCLES: u64 = 14;

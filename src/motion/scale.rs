@@ -20,6 +20,13 @@ pub struct Scale {
 }
 
 impl Scale {
+    /// Nothing is converted.
+    pub(super) const ONE: Scale = Scale {
+        per_rpm: 1.0,
+        rpm: 1.0,
+        cycles_per_second: 1.0,
+    };
+
     /// The factors for an encoder of `increments_per_turn` and a cycle.
     pub const fn new(increments_per_turn: u32, cycle: Duration) -> Scale {
         let cycle_s = cycle.as_micros() as f32 / SECOND_US;
@@ -27,6 +34,16 @@ impl Scale {
         Scale {
             per_rpm,
             rpm: 1.0 / per_rpm,
+            cycles_per_second: 1.0 / cycle_s,
+        }
+    }
+
+    /// The factors for what is counted by itself, in units and seconds.
+    pub const fn per_second(cycle: Duration) -> Scale {
+        let cycle_s = cycle.as_micros() as f32 / SECOND_US;
+        Scale {
+            per_rpm: cycle_s,
+            rpm: 1.0 / cycle_s,
             cycles_per_second: 1.0 / cycle_s,
         }
     }

@@ -1,10 +1,10 @@
 //! Arrivals, and pairs that stop together, over many seeds.
 
 use canmaster::motion::Order;
-use canmaster::motion::experiment::PROGRAM;
 use canmaster::motion::mode::Mode;
-use canmaster::motion::{AxisMove, GroupState, Step};
+use canmaster::motion::{AxisMove, GroupState};
 
+use crate::compiled::pairs;
 use crate::rig::{AXES, CYCLE_MS, READY, Rig};
 
 /// Worst figures of one round trip.
@@ -36,17 +36,16 @@ fn round_trip(rig: &mut Rig, homes: &[f64; AXES]) -> Worst {
     let mut worst = Worst::default();
     let mut from = [0.0; AXES];
     rig.released();
-    for step in PROGRAM.steps {
-        let Step::Move(moves) = step else { continue };
+    for moves in pairs() {
         rig.observe_anew();
-        rig.go(|n| moves[n].unwrap());
+        rig.go(|n| moves[n]);
         rig.arrive(1000);
         for _ in 0..45 {
             rig.step(READY);
         }
         assert_eq!(rig.group.state(), GroupState::Moving, "{}", rig.last());
         for (n, part) in moves.iter().enumerate() {
-            let target = f64::from(part.unwrap().target);
+            let target = f64::from(part.target);
             let seen = rig.observed[n];
             let error = |p: f64| (p - homes[n] - target).abs();
             let beyond = if target > from[n] {

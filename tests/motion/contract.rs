@@ -1,9 +1,11 @@
 //! The contract's sentences, each against drives.
 
 use canmaster::cia402::{Command, ControlWord, State};
+use canmaster::motion::experiment::{Motor, group};
 use canmaster::motion::mode::Mode;
-use canmaster::motion::{FaultCause, GroupEvent, GroupState, Limit, PlanError, Refusal};
-use canmaster::motion::{Inputs, Order};
+use canmaster::motion::{Fault, FaultCause, GroupEvent, GroupState, PlanError, Refusal};
+use canmaster::motion::{Director, Group, GroupConfig, Inputs, Order};
+use canmaster::time::Duration;
 
 use crate::rig::{ALL, AXES, READY, Rig, far};
 
@@ -46,35 +48,34 @@ fn a_release_is_refused_with_its_reason() {
 fn a_target_outside_the_limits_is_refused() {
     let mut rig = Rig::standby(1);
     rig.released();
-    for (change, limit, allowed) in [
-        (0, Limit::Velocity, 2200),
-        (1, Limit::Acceleration, 4000),
-        (2, Limit::Deceleration, 4000),
-        (3, Limit::Target, 2_000_000),
+    for (change, fault, allowed) in [
+        (0, Fault::Velocity, 3000),
+        (1, Fault::Acceleration, 20_000),
+        (2, Fault::Deceleration, 20_000),
+        (3, Fault::Target, -1_073_741_823),
     ] {
         let parts = core::array::from_fn(|n| {
             let mut part = far(n);
             if n == AXIS {
                 match change {
-                    0 => part.velocity = 2201,
-                    1 => part.acceleration = 4001,
-                    2 => part.deceleration = 4001,
-                    _ => part.target = -2_000_001,
+                    0 => part.velocity = 3001,
+                    1 => part.acceleration = 20_001,
+                    2 => part.deceleration = 20_001,
+                    _ => part.target = -1_073_741_824,
                 }
             }
             Some(part)
         });
-        let Err(Refusal::Program(PlanError::OutOfLimits {
-            axis,
-            limit: broken,
+        let refused = rig.director.go(&rig.group, &parts, false, 0);
+        let value = if allowed < 0 { allowed - 1 } else { allowed + 1 };
+        let expected = PlanError {
+            fault,
+            axis: AXIS as u8,
+            step: 0,
             value,
-            allowed: most,
-        })) = rig.director.go(&rig.group, &parts, false, 0)
-        else {
-            panic!("not refused");
+            allowed,
         };
-        assert_eq!((axis, broken, most), (AXIS as u8, limit, allowed));
-        assert_eq!(value.unsigned_abs(), allowed + 1);
+        assert_eq!(refused, Err(Refusal::Program(expected)));
     }
     for _ in 0..20 {
         rig.step(READY);
@@ -86,7 +87,18 @@ fn a_target_outside_the_limits_is_refused() {
 /// outside of its travel.
 #[test]
 fn turning_around_outside_of_the_travel_is_refused() {
-    let mut rig = Rig::standby(1);
+    static NARROW: GroupConfig<AXES> = group(
+        &[Motor {
+            limits: (-2_000_500, 2_000_500),
+            ..Motor::SAMPLE
+        }; AXES],
+        Duration::from_millis(10),
+        3,
+    );
+    let mut rig = Rig::new(1);
+    rig.group = Group::new(&NARROW);
+    rig.director = Director::new(&NARROW);
+    rig.until(Standby, 100);
     rig.released();
     let part = |target| {
         let mut parts = [None; AXES];
@@ -114,9 +126,9 @@ fn turning_around_outside_of_the_travel_is_refused() {
     assert!(
         matches!(
             rig.notices.last(),
-            Some(GroupEvent::MoveRefused(PlanError::OutOfLimits {
+            Some(GroupEvent::MoveRefused(PlanError {
                 axis: 0,
-                limit: Limit::Target,
+                fault: Fault::Target,
                 ..
             }))
         ),

@@ -3,7 +3,7 @@
 
 mod absent;
 mod arrivals;
-mod built_in;
+mod compiled;
 mod contract;
 mod faults;
 mod modes;
@@ -11,5 +11,6 @@ mod panel;
 mod paths;
 mod plant;
 mod programs;
+mod random;
 mod rig;
 mod table;

@@ -2,12 +2,12 @@
 
 use canmaster::id::Address;
 use canmaster::motion::experiment::GROUP;
-use canmaster::motion::format;
 use canmaster::motion::panel::{self, PROGRAM_BYTES, Panel};
 use canmaster::motion::{FaultCause, GroupEvent, GroupState, Inputs};
 use canmaster::od::Part;
-use canmaster::sdo::{AbortCode, Crc16};
+use canmaster::sdo::AbortCode;
 
+use crate::compiled::compiled;
 use crate::rig::{AXES, READY, Rig};
 
 struct Desk {
@@ -86,12 +86,7 @@ impl Desk {
 
 /// A program of one step: wait for 100 ms.
 fn one_wait() -> Vec<u8> {
-    let step = [2, 100, 0, 0, 0];
-    let mut bytes = vec![format::VERSION, AXES as u8, step.len() as u8, 0];
-    bytes.extend(step);
-    let crc = Crc16::new().update(&bytes).get();
-    bytes.extend(crc.to_le_bytes());
-    bytes
+    compiled("[[step]]\nwait_ms = 100").bytes()
 }
 
 const STATE: AbortCode = AbortCode::DEVICE_STATE;
@@ -230,7 +225,7 @@ fn the_first_fault_of_an_axis_is_kept_until_it_is_enabled_again() {
     };
     desk.panel.on_event(&fault(0x7121));
     desk.panel.on_event(&fault(0x8611));
-    assert_eq!(desk.get(panel::FAULT, 3), 0x0009_7121);
+    assert_eq!(desk.get(panel::FAULT, 3), 0x0008_7121);
     assert_eq!(desk.get(panel::FAULT, 2), 0);
     desk.panel.on_event(&GroupEvent::State {
         from: GroupState::Faulted,

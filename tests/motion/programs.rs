@@ -1,55 +1,71 @@
 //! Programs: their bytes, what is refused, and what they do.
 
 use canmaster::motion::experiment::GROUP;
-use canmaster::motion::format::{self, ProgramError, ProgramFault};
+use canmaster::motion::format;
 use canmaster::motion::mode::Mode;
-use canmaster::motion::{GroupEvent, GroupState, Limit, PlanError};
+use canmaster::motion::{Fault, GroupEvent, GroupState, PlanError};
 use canmaster::sdo::Crc16;
+use canmaster_network::program::pairs;
 use proptest::prelude::*;
 
-use crate::rig::{AXES, READY, Rig};
+use crate::compiled::{compiled, group};
+use crate::rig::{AXES, CYCLE_MS, READY, Rig};
 
 /// Frame and checksum around steps.
-fn program(steps: &[Vec<u8>]) -> Vec<u8> {
+pub(crate) fn program(steps: &[Vec<u8>]) -> Vec<u8> {
     let steps = steps.concat();
     let mut bytes = vec![format::VERSION, AXES as u8];
     bytes.extend((steps.len() as u16).to_le_bytes());
+    bytes.extend(10_000u32.to_le_bytes());
     bytes.extend(steps);
     let crc = Crc16::new().update(&bytes).get();
     bytes.extend(crc.to_le_bytes());
     bytes
 }
 
-fn go(flags: u8, jerk: u32, parts: &[(u16, i32, u32, u32, u32, u8)]) -> Vec<u8> {
-    let axes = parts.iter().fold(0, |axes, part| axes | 1u16 << part.0);
-    let mut bytes = vec![1, flags];
+fn head(kind: u8, flags: u8, axes: u16, value: u32) -> Vec<u8> {
+    let mut bytes = vec![kind, flags];
     bytes.extend(axes.to_le_bytes());
-    bytes.extend(jerk.to_le_bytes());
-    for (_, target, velocity, up, down, set) in parts {
+    bytes.extend(value.to_le_bytes());
+    bytes
+}
+
+/// A trapezoid of the axes with a part: axis, target, velocity and slope.
+fn go(flags: u8, parts: &[(u16, i32, u32, u32)]) -> Vec<u8> {
+    let axes = parts.iter().fold(0, |axes, part| axes | 1u16 << part.0);
+    let mut bytes = head(format::MOVE, flags, axes, 0);
+    for (_, target, velocity, slope) in parts {
         bytes.extend(target.to_le_bytes());
-        for number in [velocity, up, down] {
+        for number in [velocity, slope, slope] {
             bytes.extend(number.to_le_bytes());
         }
-        bytes.push(*set);
     }
     bytes
 }
 
-fn wait(ms: u32) -> Vec<u8> {
-    [vec![2], ms.to_le_bytes().to_vec()].concat()
-}
-
-fn times(times: u16) -> Vec<u8> {
-    [vec![3], times.to_le_bytes().to_vec()].concat()
-}
-
-const END: &[u8] = &[4];
-
-fn numbers(code: u8, fields: &[u16], numbers: &[i32]) -> Vec<u8> {
-    let mut bytes = vec![code];
-    bytes.extend(fields.iter().flat_map(|field| field.to_le_bytes()));
-    bytes.extend(numbers.iter().flat_map(|number| number.to_le_bytes()));
+/// A shape for axis 1: cycles, position and velocity of each point.
+fn shape(flags: u8, value: u32, amplitude: i32, points: &[(u16, i32, i32)]) -> Vec<u8> {
+    let mut bytes = head(format::PATH, flags, 1, value);
+    bytes.extend(amplitude.to_le_bytes());
+    bytes.extend([0; 4]);
+    for (cycles, position, velocity) in points {
+        bytes.extend(cycles.to_le_bytes());
+        bytes.extend(position.to_le_bytes());
+        bytes.extend(velocity.to_le_bytes());
+    }
     bytes
+}
+
+fn wait(cycles: u32) -> Vec<u8> {
+    head(format::WAIT, 0, 0, cycles)
+}
+
+fn times(times: u32) -> Vec<u8> {
+    head(format::LOOP, 0, 0, times)
+}
+
+fn end() -> Vec<u8> {
+    head(format::END_LOOP, 0, 0, 0)
 }
 
 fn run(bytes: Vec<u8>, cycles: u32) -> Rig {
@@ -77,14 +93,10 @@ fn moves_waits_and_loops() {
     let rig = run(
         program(&[
             times(3),
-            go(
-                1,
-                0,
-                &[(0, 1000, 600, 2000, 2000, 0), (1, -500, 600, 2000, 2000, 0)],
-            ),
-            wait(50),
-            END.to_vec(),
-            go(0, 5000, &[(2, 4000, 600, 2000, 2000, 0)]),
+            go(1, &[(0, 1000, 600, 2000), (1, -500, 600, 2000)]),
+            wait(5),
+            end(),
+            go(0, &[(2, 4000, 600, 2000)]),
         ]),
         2000,
     );
@@ -106,19 +118,38 @@ fn moves_waits_and_loops() {
     assert!(steps.contains(&5) && steps.iter().filter(|step| **step == 2).count() == 3);
 }
 
-/// A sine ends where it began, has its amplitude, and its speed is a sine.
+/// One release runs the experiment, as long as its course says.
+#[test]
+fn the_experiment_takes_as_long_as_it_says() {
+    let program = pairs(&group());
+    let start = Rig::standby(2).cycle;
+    let rig = run(program.bytes(), 1500);
+    let took = f64::from(rig.cycle - start) * CYCLE_MS;
+    let expected = program.course(&group()).cycles as f64 * CYCLE_MS;
+    assert!(
+        (took - expected).abs() < 0.02 * expected,
+        "{took} {expected}"
+    );
+    let steps = rig
+        .notices
+        .iter()
+        .filter(|event| matches!(event, GroupEvent::StepStarted { .. }));
+    assert_eq!(steps.count(), 3);
+    assert!(rig.standing());
+}
+
+/// A sine ends where it began and has its amplitude.
 #[test]
 fn a_sine() {
-    for points in [36, 250, 1] {
-        let cycles = if points == 1 { 200 } else { 2 };
-        if points == 1 {
-            continue;
-        }
-        let bytes = program(&[numbers(5, &[0b11, points, cycles, 3], &[1000, -700])]);
-        assert_eq!(format::check(&bytes, &GROUP), Ok(()), "{points}");
+    for (points, cycles) in [(36, 4), (250, 1), (40, 30)] {
+        let text = format!(
+            "[[step]]\n[step.sine]\naxes = [\"axis 1\", \"axis 2\"]\n\
+             amplitude = [1000, -700]\npoints = {points}\ncycles = {cycles}\nperiods = 2"
+        );
         let mut rig = Rig::standby(1);
         let from: [f64; AXES] = core::array::from_fn(|n| rig.drives[n].position.round());
-        rig.program = bytes;
+        rig.program = compiled(&text).bytes();
+        assert_eq!(format::check(&rig.program, &GROUP), Ok(()), "{points}");
         rig.run();
         let (mut high, mut low) = (f64::MIN, f64::MAX);
         for _ in 0..3000 {
@@ -140,26 +171,29 @@ fn a_sine() {
 }
 
 #[test]
-fn a_table() {
-    let numbers_of = [100, -100, 400, -300, 900, -600, 1000, -800, 400, 0];
-    let rig = run(program(&[numbers(6, &[0b101, 20, 5], &numbers_of)]), 2000);
+fn a_table_and_a_trapezoid() {
+    let text = "[[step]]\n[step.table]\naxes = [\"axis 1\", \"axis 3\"]\nevery_ms = 200\n\
+        points = [[100, -100], [400, -300], [900, -600], [1000, -800], [400, 0]]\n\
+        [[step]]\n[step.trapezoid]\naxes = [\"axis 2\"]\namplitude = 5000\nramp_ms = 300\n\
+        speed_ms = 500\nrest_ms = 200\nperiods = 2";
+    let rig = run(compiled(text).bytes(), 2000);
     let homes = homes(&rig);
     assert!((rig.drives[0].position - homes[0] - 400.0).abs() <= 3.0);
     assert!((rig.drives[2].position - homes[2]).abs() <= 3.0);
+    assert!((rig.drives[1].position - homes[1]).abs() <= 3.0);
+    assert!((rig.observed[1].highest - homes[1] - 5000.0).abs() <= 10.0);
 }
 
 /// The speed does not fall to 0 at way-points in between.
 #[test]
 fn way_points_are_passed_with_blends() {
-    let points = [
-        1200, 3000, 1200, 3000, // velocity and acceleration of both
-        10_000, 4000, 20_000, 8000, 30_000, -2000, 30_000, -9000,
-    ];
-    let bytes = program(&[numbers(7, &[0b11, 4], &points)]);
-    assert_eq!(format::check(&bytes, &GROUP), Ok(()));
+    let text = "velocity = 1200\nacceleration = 3000\n[[step]]\n[[step.move]]\nto = 0\n[[step]]\n\
+        [step.path]\naxes = [\"axis 1\", \"axis 2\"]\n\
+        points = [[10_000, 4000], [20_000, 8000], [30_000, -2000], [30_000, -9000]]";
     let mut rig = Rig::standby(3);
     let homes = homes(&rig);
-    rig.program = bytes;
+    rig.program = compiled(text).bytes();
+    assert_eq!(format::check(&rig.program, &GROUP), Ok(()));
     rig.run();
     let mut slowest = f64::MAX;
     for _ in 0..2000 {
@@ -182,21 +216,14 @@ fn way_points_are_passed_with_blends() {
 /// Homing and modes inside of a program: one release counts for all of it.
 #[test]
 fn home_then_move_in_another_mode() {
-    let mode = |mode: Mode| [vec![9, 0b11, 0], vec![mode.code() as u8]].concat();
-    let home = [vec![8, 0b11, 0], 1000u32.to_le_bytes().to_vec()].concat();
-    let rig = run(
-        program(&[
-            mode(Mode::Homing),
-            home,
-            mode(Mode::CyclicPosition),
-            go(
-                0,
-                0,
-                &[(0, 5000, 600, 2000, 2000, 0), (1, -500, 600, 2000, 2000, 0)],
-            ),
-        ]),
-        2000,
+    let axes = "axes = [\"axis 1\", \"axis 2\"]";
+    let text = format!(
+        "velocity = 600\nacceleration = 2000\n[[step]]\n[step.home]\n{axes}\n\
+         [[step]]\n[step.mode]\n{axes}\nis = \"cyclic synchronous position\"\n\
+         [[step]]\n[[step.move]]\n{axes}\nto = [5000, -500]"
     );
+    let rig = run(compiled(&text).bytes(), 2000);
+    assert_eq!(rig.drives[0].mode, Mode::CyclicPosition);
     assert!((rig.drives[0].position - 5000.0).abs() <= 5.0);
     assert!((rig.drives[1].position + 500.0).abs() <= 5.0);
 }
@@ -204,8 +231,8 @@ fn home_then_move_in_another_mode() {
 #[test]
 fn halt_goes_on_with_the_interrupted_step() {
     let bytes = program(&[
-        go(0, 0, &[(0, 40_000, 1200, 2000, 2000, 0)]),
-        go(0, 0, &[(0, 0, 1200, 2000, 2000, 0)]),
+        go(0, &[(0, 40_000, 1200, 2000)]),
+        go(0, &[(0, 0, 1200, 2000)]),
     ]);
     let mut rig = Rig::standby(1);
     rig.program = bytes;
@@ -240,7 +267,7 @@ fn halt_goes_on_with_the_interrupted_step() {
 /// A stop ends the program: the next release begins it anew.
 #[test]
 fn a_stop_ends_the_program() {
-    let bytes = program(&[go(0, 0, &[(0, 40_000, 1200, 2000, 2000, 0)])]);
+    let bytes = program(&[go(0, &[(0, 40_000, 1200, 2000)])]);
     let mut rig = Rig::standby(1);
     rig.program = bytes;
     rig.run();
@@ -266,8 +293,8 @@ fn a_stop_ends_the_program() {
 #[test]
 fn a_relative_move_out_of_the_travel_fails_at_its_step() {
     let bytes = program(&[
-        go(1, 0, &[(0, 1000, 1200, 2000, 2000, 0)]),
-        go(1, 0, &[(0, 2_000_000, 1200, 2000, 2000, 0)]),
+        go(1, &[(0, 1000, 1200, 2000)]),
+        go(1, &[(0, 1_073_741_823, 1200, 2000)]),
     ]);
     let mut rig = Rig::standby(1);
     rig.program = bytes;
@@ -279,86 +306,127 @@ fn a_relative_move_out_of_the_travel_fails_at_its_step() {
         GroupEvent::ProgramFailed(error) => Some(*error),
         _ => None,
     });
-    let fault = ProgramFault::Limit(PlanError::OutOfLimits {
+    let expected = PlanError {
+        fault: Fault::Target,
         axis: 0,
-        limit: Limit::Target,
-        value: 2_001_000,
-        allowed: 2_000_000,
-    });
-    assert_eq!(failed, Some(ProgramError { step: 2, fault }));
+        step: 2,
+        value: 1_073_742_823,
+        allowed: 1_073_741_823,
+    };
+    assert_eq!(failed, Some(expected));
     assert_eq!(rig.group.state(), GroupState::Standby);
 }
 
+/// A path that counts from home begins where it says, or not at all.
 #[test]
-fn what_is_wrong_is_named() {
-    let good = go(0, 0, &[(0, 1, 1, 1, 1, 0)]);
-    let fault = |bytes: &[u8]| format::check(bytes, &GROUP).unwrap_err();
-    let of = |steps: &[Vec<u8>]| fault(&program(steps));
-    let whole = |fault| ProgramError { step: 0, fault };
-    let at = |step, fault| ProgramError { step, fault };
-
-    let bytes = program(std::slice::from_ref(&good));
-    let mut version = bytes.clone();
-    version[0] = 2;
-    assert_eq!(fault(&version), whole(ProgramFault::Version(2)));
-    let mut axes = bytes.clone();
-    axes[1] = 5;
-    assert_eq!(fault(&axes), whole(ProgramFault::Axes(5)));
-    let mut longer = bytes.clone();
-    longer.push(0);
-    assert_eq!(fault(&longer), whole(ProgramFault::Length));
-    for length in 0..bytes.len() {
-        assert_eq!(fault(&bytes[..length]), whole(ProgramFault::Length));
+fn a_path_begins_where_it_says() {
+    let path = shape(0, 1 << 16 | 1, 1 << 30, &[(100, 400, 0)]);
+    let mut rig = Rig::standby(1);
+    rig.program = program(&[go(0, &[(0, 50, 600, 2000)]), path]);
+    assert_eq!(format::check(&rig.program, &GROUP), Ok(()));
+    rig.run();
+    for _ in 0..300 {
+        rig.step(READY);
     }
-    for at in 4..bytes.len() {
-        let mut broken = bytes.clone();
-        broken[at] ^= 0x10;
-        assert_eq!(fault(&broken), whole(ProgramFault::Checksum));
-    }
-
-    assert_eq!(
-        of(&[good.clone(), vec![99]]),
-        at(2, ProgramFault::UnknownStep(99))
-    );
-    assert_eq!(of(&[vec![0]]), at(1, ProgramFault::UnknownStep(0)));
-    assert_eq!(of(&[vec![2, 0]]), at(1, ProgramFault::Length));
-    let seventh = go(0, 0, &[(6, 1, 1, 1, 1, 0)]);
-    assert_eq!(of(&[seventh]), at(1, ProgramFault::UnknownAxis(1 << 6)));
-    assert_eq!(of(&[go(0, 0, &[])]), at(1, ProgramFault::UnknownAxis(0)));
-    assert_eq!(of(&[END.to_vec()]), at(1, ProgramFault::Loop));
-    assert_eq!(of(&[times(1)]), at(1, ProgramFault::Loop));
-    let deep = vec![times(1); 5];
-    assert_eq!(of(&deep), at(5, ProgramFault::Loop));
-    assert_eq!(of(&[vec![9, 1, 0, 7]]), at(1, ProgramFault::NoSuchMode(7)));
-    let nothing = numbers(5, &[1, 0, 1, 1], &[5]);
-    assert_eq!(of(&[nothing]), at(1, ProgramFault::Nothing));
-
-    let limit = |axis, limit, value, allowed| {
-        ProgramFault::Limit(PlanError::OutOfLimits {
-            axis,
-            limit,
-            value,
-            allowed,
-        })
+    let failed = rig.notices.last();
+    let Some(GroupEvent::ProgramFailed(error)) = failed else {
+        panic!("{failed:?}");
     };
-    let steep = go(0, 0, &[(3, 1, 1, 100_000, 1, 0)]);
-    let expected = limit(3, Limit::Acceleration, 100_000, 4000);
-    assert_eq!(of(&[good.clone(), steep]), at(2, expected));
-    // 2 pi 1000 increments in 10 cycles: 1885 rpm, and far too steep.
-    let sine = numbers(5, &[0b10, 10, 1, 1], &[1000]);
-    assert!(matches!(
-        of(&[sine]),
-        ProgramError {
-            step: 1,
-            fault: ProgramFault::Limit(PlanError::OutOfLimits {
-                axis: 1,
-                limit: Limit::Acceleration,
-                ..
-            })
-        }
-    ));
-    let table = numbers(6, &[1, 1, 2], &[10_000, 20_000]);
-    assert!(matches!(of(&[table]).fault, ProgramFault::Limit(_)));
+    let found = (error.fault, error.step, error.value, error.allowed);
+    assert_eq!(found, (Fault::Begin, 2, 50, 0));
+    assert_eq!(rig.group.state(), GroupState::Standby);
+}
+
+/// What is wrong with `bytes`: fault, axis, step, value, allowed.
+fn wrong(bytes: &[u8]) -> (Fault, u8, u16, i32, i32) {
+    let error = format::check(bytes, &GROUP).unwrap_err();
+    let PlanError {
+        fault,
+        axis,
+        step,
+        value,
+        allowed,
+    } = error;
+    (fault, axis, step, value, allowed)
+}
+
+const NONE: u8 = PlanError::NO_AXIS;
+
+#[test]
+fn a_frame_that_is_wrong_is_named() {
+    let bytes = program(&[wait(1)]);
+    let with = |at: usize, value: u8| {
+        let mut bytes = bytes.clone();
+        bytes[at] = value;
+        wrong(&bytes)
+    };
+    assert_eq!(with(0, 1), (Fault::Version, NONE, 0, 1, 2));
+    assert_eq!(with(1, 5), (Fault::Axes, NONE, 0, 5, 6));
+    assert_eq!(with(4, 0), (Fault::Cycle, NONE, 0, 9984, 10_000));
+    let longer = [&bytes[..], &[0]].concat();
+    assert_eq!(wrong(&longer), (Fault::Length, NONE, 0, 19, 18));
+    for length in 0..bytes.len() {
+        assert!(format::check(&bytes[..length], &GROUP).is_err());
+    }
+    for at in 8..bytes.len() {
+        assert_eq!(with(at, bytes[at] ^ 0x10).0, Fault::Checksum, "{at}");
+    }
+    let error = format::check(&bytes[..8], &GROUP).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "step 0: length in bytes is 8, allowed is 18"
+    );
+}
+
+#[test]
+fn a_step_that_is_wrong_is_named() {
+    let good = go(0, &[(0, 1, 1, 1)]);
+    let of = |steps: &[Vec<u8>]| wrong(&program(steps));
+    let unknown = head(99, 0, 0, 0);
+    assert_eq!(of(&[good, unknown]), (Fault::Step, NONE, 2, 99, 7));
+    assert_eq!(of(&[vec![0]]).0, Fault::Length);
+    assert_eq!(of(&[vec![1, 0, 1, 0]]).0, Fault::Length);
+    let seventh = go(0, &[(6, 1, 1, 1)]);
+    assert_eq!(of(&[seventh]), (Fault::Members, NONE, 1, 64, 63));
+    assert_eq!(of(&[go(0, &[])]), (Fault::Members, NONE, 1, 0, 63));
+    assert_eq!(of(&[end()]), (Fault::Loop, NONE, 1, 0, 4));
+    assert_eq!(of(&[times(1)]), (Fault::Loop, NONE, 0, 1, 0));
+    assert_eq!(of(&vec![times(1); 5]), (Fault::Loop, NONE, 5, 5, 4));
+    let mode = head(format::MODE, 7, 1, 0);
+    assert_eq!(of(&[mode]), (Fault::Mode, 0, 1, 7, 0x3A5));
+    let steep = go(0, &[(3, 1, 1, 100_000)]);
+    assert_eq!(of(&[steep]), (Fault::Acceleration, 3, 1, 100_000, 20_000));
+    let fast = go(0, &[(4, 1, 3001, 1)]);
+    assert_eq!(of(&[fast]), (Fault::Velocity, 4, 1, 3001, 3000));
+    let none = go(0, &[(4, 1, 0, 1)]);
+    assert_eq!(of(&[none]), (Fault::Velocity, 4, 1, 0, 3000));
+    let far = go(0, &[(2, i32::MIN, 1, 1)]);
+    let expected = (Fault::Target, 2, 1, i32::MIN, -1_073_741_823);
+    assert_eq!(of(&[far]), expected);
+}
+
+#[test]
+fn a_path_that_is_wrong_is_named() {
+    const ONCE: u32 = 1 << 16;
+    let of = |step: Vec<u8>| wrong(&program(&[step]));
+    let nothing = shape(1, ONCE, 1, &[]);
+    assert_eq!(of(nothing), (Fault::Points, NONE, 1, 1 << 16, 0));
+    assert_eq!(of(shape(1, 1, 1, &[(1, 0, 0)])).0, Fault::Points);
+    let no_time = shape(1, ONCE | 1, 1, &[(0, 0, 0)]);
+    assert_eq!(of(no_time), (Fault::Points, 0, 1, 0, -1));
+    // 1000 increments in one cycle: three times as fast in the middle.
+    let fast = shape(1, ONCE | 1, 1 << 30, &[(1, 4000, 0)]);
+    assert_eq!(of(fast), (Fault::Velocity, 0, 1, 9000, 3000));
+    let steep = shape(1, ONCE | 1, 1 << 30, &[(3, 1200, 0)]);
+    assert_eq!(of(steep).0, Fault::Acceleration);
+    let goes_on = shape(1, ONCE | 1, 1 << 30, &[(10, 40, 8)]);
+    assert_eq!(of(goes_on), (Fault::End, 0, 1, 0, 0));
+    let climbs = shape(1, 2 << 16 | 1, 1 << 30, &[(10, 40, 0)]);
+    assert_eq!(of(climbs), (Fault::End, 0, 1, 10, 0));
+    // Slow, but far.
+    let far = vec![(u16::MAX, i32::MAX / 2, 0), (u16::MAX, i32::MAX, 0)];
+    let far = shape(0, ONCE | 2, i32::MAX, &far);
+    assert_eq!(of(far).0, Fault::Velocity);
 }
 
 proptest! {

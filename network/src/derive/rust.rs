@@ -75,6 +75,7 @@ fn write(machine: &Machine, library: &str, out: &mut String) -> std::fmt::Result
     super::cycle::cycle(machine, out)?;
     out.push('\n');
     motors(machine, out)?;
+    program(machine, out)?;
     writeln!(out, "/// The bus \"{}\".", bus.name.escape_default())?;
     writeln!(out, "pub static NETWORK: Network = Network {{")?;
     writeln!(out, "    bit_rate: {},", bus.bit_rate)?;
@@ -121,6 +122,25 @@ fn motors(machine: &Machine, out: &mut String) -> std::fmt::Result {
         writeln!(out, "        max_acceleration: {},", motor.max_acceleration)?;
         writeln!(out, "        limits: {:?},", motor.limits)?;
         writeln!(out, "        modes: 0x{:X},\n    }},", motor.modes)?;
+    }
+    writeln!(out, "];\n")
+}
+
+fn program(machine: &Machine, out: &mut String) -> std::fmt::Result {
+    const LINE: usize = 12;
+    let Some(program) = &machine.program else {
+        return Ok(());
+    };
+    let bytes = program.bytes();
+    writeln!(
+        out,
+        "/// What one release runs: \"{}\".",
+        program.name.escape_default()
+    )?;
+    writeln!(out, "pub static PROGRAM: [u8; {}] = [", bytes.len())?;
+    for line in bytes.chunks(LINE) {
+        let line: Vec<String> = line.iter().map(|byte| format!("0x{byte:02X},")).collect();
+        writeln!(out, "    {}", line.join(" "))?;
     }
     writeln!(out, "];\n")
 }

@@ -71,6 +71,7 @@ pub(super) struct Resolved {
     pub(super) increments_per_turn: Option<u32>,
     pub(super) gear: (u32, u32),
     pub(super) supported_modes: Option<u32>,
+    pub(super) units_per_turn: Option<u32>,
     pub(super) writes: Vec<Write>,
 }
 
@@ -83,6 +84,7 @@ pub(super) fn merged(device: &Axis, node: &Axis) -> Axis {
         mode: node.mode.clone().or_else(|| device.mode.clone()),
         increments_per_turn: or(&node.increments_per_turn, &device.increments_per_turn),
         gear: node.gear.clone().or_else(|| device.gear.clone()),
+        units_per_turn: or(&node.units_per_turn, &device.units_per_turn),
         max_speed: or(&node.max_speed, &device.max_speed),
         max_acceleration: or(&node.max_acceleration, &device.max_acceleration),
         quick_stop: or(&node.quick_stop, &device.quick_stop),
@@ -156,11 +158,14 @@ pub(super) fn resolve(
     let increments = axis.increments_per_turn.as_ref();
     let increments_per_turn =
         context.optional(increments, "increments_per_turn", 1..=INCREMENTS_MAX);
+    let units = axis.units_per_turn.as_ref();
+    let units_per_turn = context.optional(units, "units_per_turn", TURNS);
     let gear = gear(axis.gear.as_ref(), context);
     writer.complete.then_some(Resolved {
         increments_per_turn,
         gear: gear?,
         supported_modes: supported_modes(eds, node).map(|bits| bits as u32),
+        units_per_turn,
         writes: writer.writes,
     })
 }

@@ -20,6 +20,7 @@ use crate::eds::Eds;
 use crate::model::{Liveness, Machine, Master, Node};
 use crate::object::Direction;
 use crate::problem::{Place, Problems, nearest};
+use crate::program::{self, Group, Program};
 use crate::source::Source;
 
 /// Opens a file that the description names.
@@ -92,13 +93,42 @@ pub(crate) fn machine(
     if for_firmware && !context.problems.has_errors() {
         check::firmware(description, &nodes, &mut context);
     }
-    Some(Machine {
+    let mut machine = Machine {
         master,
         buses,
         liveness,
         missing_tpdos,
         nodes,
-    })
+        program: None,
+    };
+    machine.program = program(description, &machine, open, &mut context);
+    Some(machine)
+}
+
+/// What one release runs: what the description names, or S1's experiment.
+fn program(
+    description: &Description,
+    machine: &Machine,
+    open: &mut Open<'_>,
+    context: &mut Context<'_>,
+) -> Option<Program> {
+    let group = Group::of(machine)?;
+    let Some(named) = &description.group.program else {
+        return Some(program::pairs(&group));
+    };
+    match open(named.get_ref()) {
+        Ok(source) => program::resolve(&source, &group, context.problems),
+        Err(error) => {
+            let place = context.at(named);
+            context.problems.error(
+                &place,
+                named.get_ref(),
+                format!("the motion program cannot be read: {error}"),
+                "give its path from the folder of this file; without the key it is S1's experiment",
+            );
+            None
+        }
+    }
 }
 
 /// One may fall to a bus error and one to its retransmission.
@@ -226,6 +256,7 @@ fn resolve_node(
         increments_per_turn: axis.increments_per_turn,
         gear: axis.gear,
         supported_modes: axis.supported_modes,
+        units_per_turn: axis.units_per_turn,
         start_values: axis.writes,
     })
 }

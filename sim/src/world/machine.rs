@@ -4,14 +4,14 @@
 use std::path::Path;
 use std::sync::LazyLock;
 
-use canmaster::motion::experiment::{self, Motor};
-use canmaster::motion::{AxisMove, Program, Step};
+use canmaster::motion::experiment::Motor;
 use canmaster::network::sample::SIX_EPOS4;
 use canmaster::network::{ConfigWrite, Identity, Master, Network, Node, Pdo};
 use canmaster::pdo::{MappingEntry, Transmission};
 use canmaster::time::Duration;
 use canmaster::{NodeId, id::Address};
 use canmaster_network::model;
+use canmaster_network::program::{self, Axis, Group, Program};
 
 use crate::judge::{Assignment, Part, Traffic};
 use crate::time::Time;
@@ -56,15 +56,19 @@ pub struct Machine {
 
 /// The sample: six EPOS4.
 pub fn sample() -> &'static Machine {
-    static SAMPLE: LazyLock<Machine> = LazyLock::new(|| Machine {
-        network: &SIX_EPOS4,
-        segments: vec![sample_segment()],
-        motors: vec![Motor::SAMPLE; SIX_EPOS4.nodes.len()],
-        moves: moves(experiment::PROGRAM.steps),
-        round_trip: experiment::PROGRAM
-            .duration(&experiment::GROUP)
-            .ok()
-            .map(Time::from),
+    static SAMPLE: LazyLock<Machine> = LazyLock::new(|| {
+        let motors = vec![Motor::SAMPLE; SIX_EPOS4.nodes.len()];
+        let axes = SIX_EPOS4.nodes.iter().zip(&motors);
+        let axes = axes.map(|(node, motor)| Axis::new(node.name.to_string(), described(motor)));
+        let group = Group::new(axes.collect(), SIX_EPOS4.cycle.as_micros());
+        let (moves, round_trip) = course(&program::pairs(&group), &group);
+        Machine {
+            network: &SIX_EPOS4,
+            segments: vec![sample_segment()],
+            motors,
+            moves,
+            round_trip,
+        }
     });
     &SAMPLE
 }
@@ -99,7 +103,12 @@ impl Machine {
             return Err(MachineError::Cycles);
         }
         let network = network(described).ok_or_else(none)?;
-        let (moves, round_trip) = program(&motors, network.cycle).ok_or_else(none)?;
+        let group = Group::of(described).filter(|group| !group.axes.is_empty());
+        let group = group.filter(|group| group.axes.len() <= AXES_MAX);
+        let (Some(group), Some(program)) = (group, &described.program) else {
+            return Err(none());
+        };
+        let (moves, round_trip) = course(program, &group);
         Ok(Machine {
             network: Box::leak(Box::new(network)),
             segments: segments(described),
@@ -154,40 +163,37 @@ impl Machine {
     }
 }
 
-/// Where each axis has to go, step by step.
-fn moves<const N: usize>(steps: &[Step<N>]) -> Vec<Vec<Option<Part>>> {
-    let part = |part: &AxisMove| Part {
-        target: part.target,
-        set: part.set,
-    };
-    let of_step = |step: &Step<N>| match step {
-        Step::Move(parts) => Some(parts.iter().map(|p| p.as_ref().map(part)).collect()),
-        _ => None,
-    };
-    steps.iter().filter_map(of_step).collect()
-}
+/// Axes that the firmware leads at most.
+const AXES_MAX: usize = 16;
 
-/// Moves and round trip of the firmware's program for these motors.
+/// Where each axis has to come to rest, and how long that takes.
 type Moves = (Vec<Vec<Option<Part>>>, Option<Time>);
 
-fn program(motors: &[Motor], cycle: Duration) -> Option<Moves> {
-    fn of<const N: usize>(motors: &[Motor], cycle: Duration) -> Option<Moves> {
-        let motors: &[Motor; N] = motors.try_into().ok()?;
-        let steps: &'static [Step<N>] = Box::leak(Box::new(experiment::steps(motors, cycle)));
-        let group = experiment::group(motors, cycle, u8::MAX);
-        let program = Program {
-            name: "pairs, there and back",
-            steps,
-        };
-        let duration = program.duration(&group).ok();
-        Some((moves(steps), duration.map(Time::from)))
-    }
-    // The number of axes is part of the type.
-    let all = [
-        of::<1>, of::<2>, of::<3>, of::<4>, of::<5>, of::<6>, of::<7>, of::<8>, of::<9>, of::<10>,
-        of::<11>, of::<12>, of::<13>, of::<14>, of::<15>, of::<16>,
-    ];
-    all.get(motors.len().checked_sub(1)?)?(motors, cycle)
+/// What a program asks for, as the description has it and nobody else.
+fn course(program: &Program, group: &Group) -> Moves {
+    let course = program.course(group);
+    let part = |stop: Option<program::Stop>| {
+        stop.map(|stop| Part {
+            target: stop.target,
+            set: stop.set,
+        })
+    };
+    let rests = course.rests.into_iter();
+    let moves = rests.map(|rest| rest.into_iter().map(part).collect());
+    let whole = Time::from_us(course.cycles * u64::from(group.cycle_us));
+    (moves.collect(), (!course.endless).then_some(whole))
+}
+
+/// A motor as the description has it.
+const fn described(motor: &Motor) -> model::Motor {
+    model::Motor::new(
+        motor.increments_per_turn,
+        motor.gear,
+        motor.max_speed,
+        motor.max_acceleration,
+        motor.limits,
+        motor.modes,
+    )
 }
 
 fn motor(node: &model::Node) -> Option<Motor> {
@@ -324,22 +330,27 @@ mod tests {
             (8, &[1, 2, 1, 2, 3, 3, 4, 4]),
             (12, &[1, 2, 1, 2, 3, 3, 4, 5, 4, 5, 6, 6]),
         ] {
-            let motors = vec![Motor::SAMPLE; axes];
-            let (moves, round_trip) = program(&motors, Duration::from_millis(10)).unwrap();
+            let (moves, round_trip) = pairs(&vec![Motor::SAMPLE; axes]);
             assert!(round_trip.is_some());
             for parts in moves {
                 let found: Vec<u8> = parts.iter().map(|part| part.unwrap().set).collect();
                 assert_eq!(found, sets);
             }
         }
-        assert!(program(&[], Duration::from_millis(10)).is_none());
-        assert!(program(&[Motor::SAMPLE; 17], Duration::from_millis(10)).is_none());
+    }
+
+    /// What motors do in cycles of 10 ms.
+    fn pairs(motors: &[Motor]) -> Moves {
+        const CYCLE_US: u32 = 10_000;
+        let axis = |motor: &Motor| Axis::new("axis".to_string(), described(motor));
+        let group = Group::new(motors.iter().map(axis).collect(), CYCLE_US);
+        course(&program::pairs(&group), &group)
     }
 
     #[test]
     fn the_program_keeps_within_the_limits_of_the_axis() {
         let targets = |motor: Motor| -> Vec<i32> {
-            let (moves, round_trip) = program(&[motor; 6], Duration::from_millis(10)).unwrap();
+            let (moves, round_trip) = pairs(&[motor; 6]);
             assert!(round_trip.is_some());
             moves[0].iter().map(|part| part.unwrap().target).collect()
         };

@@ -1,417 +1,333 @@
 //! Programs as bytes; see `docs/motion.md`. All numbers little-endian.
 
+use crate::motion::fixed;
 use crate::motion::mode::Mode;
-use crate::motion::program::{AxisMove, Limit, PlanError};
-use crate::motion::scale::Scale;
+use crate::motion::path::Knot;
+use crate::motion::program::{AxisMove, Fault, PlanError, within};
 use crate::motion::{AxisConfig, GroupConfig};
 use crate::sdo::Crc16;
-use crate::words::in_words;
 
 /// The version of the format.
-pub const VERSION: u8 = 1;
-/// Bytes before the steps.
-const HEADER: usize = 4;
+pub const VERSION: u8 = 2;
+/// Bytes before the steps: version, axes, length of the steps, SYNC period.
+const HEADER: usize = 8;
 /// Bytes behind them.
 const CRC: usize = 2;
 /// How deep loops may be.
 pub const LOOPS: usize = 4;
-/// A move counts from where the axes are.
+
+/// A step begins with its kind, flags or a mode, the set of its axes, and a number.
+const STEP: usize = 8;
+/// Axes start in one SYNC and arrive in one SYNC; the number is the jerk in
+/// rpm/s^2, 0 for a trapezoid.
+pub const MOVE: u8 = 1;
+/// All axes hold their positions for so many cycles.
+pub const WAIT: u8 = 2;
+/// What follows up to the end of the loop is done so many times; 0: for ever.
+pub const LOOP: u8 = 3;
+/// The end of a loop.
+pub const END_LOOP: u8 = 4;
+/// Axes follow points: the number of them, and in the upper half how often.
+pub const PATH: u8 = 5;
+/// The drives search for their homes, at most for so many cycles.
+pub const HOME: u8 = 6;
+/// Change to the mode of operation that stands for the flags.
+pub const MODE: u8 = 7;
+
+/// A move counts from where the axes are, a path from where it begins, which is
+/// anywhere.
 pub const RELATIVE: u8 = 1;
 /// The next step follows as soon as the references have ended.
 pub const FLYING: u8 = 2;
+/// One shape for all axes of a path, each with its amplitude.
+pub const SHARED: u8 = 4;
 
-/// Bytes of one axis' part of a move.
-const MOVE_PART: usize = 17;
+/// Bytes of one axis' part of a move: target, velocity with the set in its upper
+/// eight bits, acceleration, deceleration.
+const MOVE_PART: usize = 16;
+/// Of a path: amplitude, and where it begins.
+const PATH_PART: usize = 8;
+/// Cycles of a point, and for each shape its position and velocity.
+const POINT: usize = 2;
+const SHAPE: usize = 8;
 /// Bytes of a number.
 const NUMBER: usize = 4;
 
+/// The number at a place; 0 behind the end.
+#[inline(never)]
+fn number(bytes: &[u8], at: usize) -> u32 {
+    let bytes = bytes.get(at..).and_then(|bytes| bytes.first_chunk());
+    bytes.map_or(0, |bytes| u32::from_le_bytes(*bytes))
+}
+
 /// A step of a program.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Step<'a> {
-    /// Axes start in one SYNC and arrive in one SYNC.
-    Move {
-        /// [`RELATIVE`], [`FLYING`].
-        flags: u8,
-        /// Bit n: axis n.
-        axes: u32,
-        /// rpm/s^2; 0: trapezoid.
-        jerk: u32,
-        /// The parts of its axes.
-        parts: &'a [u8],
-    },
-    /// All axes hold their positions.
-    Wait {
-        /// Milliseconds.
-        ms: u32,
-    },
-    /// What follows up to the end of the loop is repeated.
-    Loop {
-        /// 0: for ever.
-        times: u16,
-    },
-    /// The end of a loop.
-    EndLoop,
-    /// A set-point generator.
-    Generator(Generator<'a>),
-    /// The drives search for their homes.
-    Home {
-        /// Bit n: axis n.
-        axes: u32,
-        /// Limit in milliseconds.
-        ms: u32,
-    },
-    /// Change the mode of operation.
-    Mode {
-        /// Bit n: axis n.
-        axes: u32,
-        /// The new one.
-        mode: Mode,
-    },
-}
-
-/// What a generator makes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// A sine of the velocity: amplitudes in increments.
-    Sine,
-    /// Positions at equal distances of time, counted from the start.
-    Table,
-    /// Way-points, passed with blends: velocity and acceleration of each axis,
-    /// then positions from home.
-    Points,
-}
-
-/// A set-point generator.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Generator<'a> {
-    /// What it makes.
-    pub kind: Kind,
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Step<'a> {
+    pub(super) kind: u8,
+    pub(super) flags: u8,
     /// Bit n: axis n.
-    pub axes: u32,
-    /// Points; of a sine those of a period.
-    pub points: u16,
-    /// Cycles from one point to the next.
-    pub cycles: u16,
-    /// Periods of a sine.
-    pub periods: u16,
-    /// Numbers, those of a point or of an axis beside one another.
-    pub numbers: &'a [u8],
+    pub(super) axes: u32,
+    pub(super) value: u32,
+    /// What stands behind that, and the steps that follow.
+    body: &'a [u8],
 }
 
-impl Generator<'_> {
-    /// How many axes take part.
-    pub const fn members(&self) -> usize {
+impl<'a> Step<'a> {
+    /// The step at a place; at the end one without a kind.
+    #[inline(never)]
+    pub(super) fn at(steps: &'a [u8], at: usize) -> Step<'a> {
+        let head = number(steps, at);
+        Step {
+            kind: head as u8,
+            flags: (head >> u8::BITS) as u8,
+            axes: head >> u16::BITS,
+            value: number(steps, at + NUMBER),
+            body: steps.get(at + STEP..).unwrap_or_default(),
+        }
+    }
+
+    pub(super) const fn has(&self, flag: u8) -> bool {
+        self.flags & flag != 0
+    }
+
+    const fn members(&self) -> usize {
         self.axes.count_ones() as usize
     }
 
-    /// The number at a place; 0 if there is none.
-    pub fn number(&self, place: usize) -> i32 {
-        let bytes = self.numbers.get(place * NUMBER..);
-        let bytes = bytes.and_then(|bytes| bytes.first_chunk());
-        bytes.map_or(0, |bytes| i32::from_le_bytes(*bytes))
-    }
-}
-
-/// What is wrong with a program.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum ProgramFault {
-    /// It ends too early, or goes on after its end.
-    Length,
-    /// Another version of the format.
-    Version(u8),
-    /// Made for another number of axes.
-    Axes(u8),
-    /// The checksum is wrong.
-    Checksum,
-    /// There is no such step.
-    UnknownStep(u8),
-    /// The group has no such axis, or the step has none at all; bit n: axis n.
-    UnknownAxis(u32),
-    /// There is no such mode, or the drive does not have it.
-    NoSuchMode(i8),
-    /// Loops are too deep, end without beginning, or do not end.
-    Loop,
-    /// A generator without points, cycles or periods.
-    Nothing,
-    /// A value breaks a limit.
-    Limit(PlanError),
-}
-
-in_words!(ProgramFault {
-    ProgramFault::Length => ("it ends too early or too late"),
-    ProgramFault::Version(version) => ("version {} of the format, not {}", version, VERSION),
-    ProgramFault::Axes(axes) => ("it is made for {} axes", axes),
-    ProgramFault::Checksum => ("its checksum is wrong"),
-    ProgramFault::UnknownStep(code) => ("there is no step of kind {}", code),
-    ProgramFault::UnknownAxis(axes) => ("axes {:#b}: there are not so many, or none", axes),
-    ProgramFault::NoSuchMode(mode) => ("the drive does not have mode {}", mode),
-    ProgramFault::Loop => ("loops are too deep, or do not fit together"),
-    ProgramFault::Nothing => ("points, cycles and periods have to be 1 at least"),
-    ProgramFault::Limit(error) => ("{}", error),
-});
-
-/// What is wrong with a program, and where.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ProgramError {
-    /// Step, counted from 1; 0: the program as a whole.
-    pub step: u16,
-    /// What.
-    pub fault: ProgramFault,
-}
-
-in_words!(ProgramError {
-    ProgramError { step: 0, fault } => ("the program: {}", fault),
-    ProgramError { step, fault } => ("step {}: {}", step, fault),
-});
-
-impl core::error::Error for ProgramError {}
-
-/// Takes little-endian numbers from the front.
-struct Reader<'a>(&'a [u8]);
-
-impl<'a> Reader<'a> {
-    fn take(&mut self, bytes: usize) -> Option<&'a [u8]> {
-        let (taken, left) = self.0.split_at_checked(bytes)?;
-        self.0 = left;
-        Some(taken)
+    /// Bytes of a point of a path, all its shapes included.
+    const fn point_len(&self) -> usize {
+        let shapes = if self.has(SHARED) { 1 } else { self.members() };
+        POINT + shapes * SHAPE
     }
 
-    /// A number of 1, 2 or 4 bytes.
+    /// Points of a path.
+    pub(super) const fn points(&self) -> usize {
+        self.value as u16 as usize
+    }
+
+    /// How often a path is followed.
+    pub(super) const fn periods(&self) -> u32 {
+        self.value >> u16::BITS
+    }
+
+    /// All of its bytes.
+    pub(super) const fn len(&self) -> usize {
+        STEP + match self.kind {
+            MOVE => self.members() * MOVE_PART,
+            PATH => self.members() * PATH_PART + self.points() * self.point_len(),
+            _ => 0,
+        }
+    }
+
+    /// A member's part of a move.
     #[inline(never)]
-    fn number(&mut self, bytes: usize) -> Option<u32> {
-        let taken = self.take(bytes)?;
-        let shifted = taken.iter().rev();
-        Some(shifted.fold(0, |number, byte| number << u8::BITS | u32::from(*byte)))
+    pub(super) fn part(&self, member: usize) -> AxisMove {
+        const SET: u32 = 24;
+        let at = member * MOVE_PART;
+        let velocity = number(self.body, at + NUMBER);
+        AxisMove {
+            target: number(self.body, at) as i32,
+            velocity: velocity & ((1 << SET) - 1),
+            acceleration: number(self.body, at + 2 * NUMBER),
+            deceleration: number(self.body, at + 3 * NUMBER),
+            set: (velocity >> SET) as u8,
+        }
     }
-}
 
-/// The steps of a program, its frame and checksum being right.
-///
-/// # Errors
-/// What is wrong with it as a whole.
-pub fn steps(bytes: &[u8], axes: usize) -> Result<&[u8], ProgramFault> {
-    let mut reader = Reader(bytes);
-    let header = (reader.number(1), reader.number(1), reader.number(2));
-    let (Some(version), Some(made_for), Some(length)) = header else {
-        return Err(ProgramFault::Length);
-    };
-    if version != u32::from(VERSION) {
-        return Err(ProgramFault::Version(version as u8));
+    /// Where a member's path begins, in increments from home.
+    pub(super) fn begin(&self, member: usize) -> i32 {
+        number(self.body, member * PATH_PART + NUMBER) as i32
     }
-    if made_for as usize != axes {
-        return Err(ProgramFault::Axes(made_for as u8));
+
+    /// A member's point, as a knot from where the path begins.
+    #[inline(never)]
+    pub(super) fn point(&self, member: usize, point: usize) -> Knot {
+        let amplitude = i64::from(number(self.body, member * PATH_PART) as i32);
+        let times = |at| amplitude * i64::from(number(self.body, at) as i32);
+        let at = self.members() * PATH_PART + point * self.point_len();
+        let shape = if self.has(SHARED) { 0 } else { member };
+        let of_shape = at + POINT + shape * SHAPE;
+        Knot {
+            cycles: u32::from(number(self.body, at) as u16),
+            position: times(of_shape),
+            velocity: times(of_shape + NUMBER),
+        }
     }
-    let length = length as usize;
-    let (Some(steps), Some(crc), []) = (reader.take(length), reader.number(CRC), reader.0) else {
-        return Err(ProgramFault::Length);
-    };
-    let summed = bytes.get(..HEADER + length).unwrap_or_default();
-    if u32::from(Crc16::new().update(summed).get()) != crc {
-        return Err(ProgramFault::Checksum);
+
+    /// Checks a member's path against the limits of its axis: every piece, since it
+    /// lies within the hull of its control points. The travel as well, if it is
+    /// known where it begins. Its steepest slope in increments per cycle squared.
+    #[inline(never)]
+    pub(super) fn check_path(
+        &self,
+        axis: u8,
+        member: usize,
+        limits: &AxisConfig,
+        begin: Option<i32>,
+    ) -> Result<f32, PlanError> {
+        const THIRD: f32 = 1.0 / 3.0;
+        let mut before = Knot::default();
+        let (mut fastest, mut steepest) = (0.0, 0.0);
+        let greatest = |so_far: &mut f32, x: f32| {
+            if x.abs() > *so_far {
+                *so_far = x.abs();
+            }
+        };
+        for point in 0..self.points() {
+            let knot = self.point(member, point);
+            let cycles = knot.cycles as f32;
+            let way = fixed::float(knot.position.wrapping_sub(before.position));
+            let (from, to) = (fixed::float(before.velocity), fixed::float(knot.velocity));
+            let middle = 3.0 * way / cycles - from - to;
+            greatest(&mut fastest, to);
+            greatest(&mut fastest, middle);
+            greatest(&mut steepest, 2.0 * (middle - from) / cycles);
+            greatest(&mut steepest, 2.0 * (to - middle) / cycles);
+            if let Some(begin) = begin {
+                for (from, ahead) in [(&before, from), (&knot, -to), (&knot, 0.0)] {
+                    let ahead = fixed::fixed(ahead * cycles * THIRD);
+                    let at = fixed::round(from.position.wrapping_add(ahead));
+                    limits.reaches(axis, begin.saturating_add(at))?;
+                }
+            }
+            before = knot;
+            within(axis, Fault::Points, knot.cycles, u32::MAX)?;
+        }
+        let (rpm, slope) = (limits.scale.rpm(fastest), limits.scale.rpm_per_s(steepest));
+        let most = limits.acceleration_max;
+        within(axis, Fault::Velocity, (rpm as u32).max(1), limits.velocity_max)?;
+        within(axis, Fault::Acceleration, (slope as u32).max(1), most)?;
+        let way = if self.periods() > 1 { before.position } else { 0 };
+        if before.velocity | way != 0 {
+            return Err(PlanError {
+                axis,
+                ..PlanError::whole(Fault::End, fixed::round(way) as u32, 0)
+            });
+        }
+        Ok(steepest)
     }
-    Ok(steps)
 }
 
 /// The steps of a program that was checked before.
-pub(super) fn body(bytes: &[u8]) -> &[u8] {
+pub(super) fn steps(bytes: &[u8]) -> &[u8] {
     let end = bytes.len().saturating_sub(CRC);
     bytes.get(HEADER..end).unwrap_or_default()
 }
 
-/// The first step of `bytes`, and how many bytes it has.
-///
-/// # Errors
-/// What is wrong with it.
-pub fn step(bytes: &[u8]) -> Result<(Step<'_>, usize), ProgramFault> {
-    let mut reader = Reader(bytes);
-    let code = reader.number(1).ok_or(ProgramFault::Length)? as u8;
-    let step = decode(code, &mut reader)?.ok_or(ProgramFault::Length)?;
-    Ok((step, bytes.len() - reader.0.len()))
-}
-
-/// `None`: there are too few bytes.
-fn decode<'a>(code: u8, reader: &mut Reader<'a>) -> Result<Option<Step<'a>>, ProgramFault> {
-    /// Sizes of the fields that each kind of step begins with.
-    const FIELDS: [&[u8]; 9] = [
-        &[1, 2, 4],
-        &[4],
-        &[2],
-        &[],
-        &[2, 2, 2, 2],
-        &[2, 2, 2],
-        &[2, 2],
-        &[2, 4],
-        &[2, 1],
-    ];
-    let sizes = FIELDS.get(usize::from(code).wrapping_sub(1));
-    let sizes = *sizes.ok_or(ProgramFault::UnknownStep(code))?;
-    let mut fields = [0; 4];
-    for (field, size) in fields.iter_mut().zip(sizes) {
-        match reader.number(usize::from(*size)) {
-            Some(number) => *field = number,
-            None => return Ok(None),
-        }
-    }
-    let [first, second, third, fourth] = fields;
-    let members = first.count_ones() as usize;
-    let points = second as usize;
-    let mut generator = |kind, numbers: usize| {
-        Some(Step::Generator(Generator {
-            kind,
-            axes: first,
-            points: second as u16,
-            cycles: third as u16,
-            periods: fourth as u16,
-            numbers: reader.take(numbers * NUMBER)?,
-        }))
-    };
-    Ok(match code {
-        1 => {
-            let parts = reader.take(second.count_ones() as usize * MOVE_PART);
-            parts.map(|parts| Step::Move {
-                flags: first as u8,
-                axes: second,
-                jerk: third,
-                parts,
-            })
-        }
-        2 => Some(Step::Wait { ms: first }),
-        3 => Some(Step::Loop {
-            times: first as u16,
-        }),
-        4 => Some(Step::EndLoop),
-        5 => generator(Kind::Sine, members),
-        // Cycles come before points.
-        6 => generator(Kind::Table, members * third as usize).map(|step| match step {
-            Step::Generator(table) => Step::Generator(Generator {
-                points: table.cycles,
-                cycles: table.points,
-                periods: 1,
-                ..table
-            }),
-            step => step,
-        }),
-        7 => generator(Kind::Points, members * (2 + points)).map(|step| match step {
-            Step::Generator(points) => Step::Generator(Generator {
-                cycles: 1,
-                periods: 1,
-                ..points
-            }),
-            step => step,
-        }),
-        8 => Some(Step::Home {
-            axes: first,
-            ms: second,
-        }),
-        _ => {
-            let code = second as i8;
-            let mode = Mode::of(code).ok_or(ProgramFault::NoSuchMode(code))?;
-            Some(Step::Mode { axes: first, mode })
-        }
-    })
-}
-
-/// The part of the member number `member` in those of a move.
-pub fn part(parts: &[u8], member: usize) -> Option<AxisMove> {
-    let mut reader = Reader(parts.get(member * MOVE_PART..)?);
-    Some(AxisMove {
-        target: reader.number(NUMBER)? as i32,
-        velocity: reader.number(NUMBER)?,
-        acceleration: reader.number(NUMBER)?,
-        deceleration: reader.number(NUMBER)?,
-        set: reader.number(1)? as u8,
-    })
-}
-
 /// The axes of a set with their place among its members.
-pub fn members(axes: u32) -> impl Iterator<Item = (usize, usize)> {
-    let axes = (0..u32::BITS as usize).filter(move |axis| axes >> axis & 1 != 0);
+pub(super) fn members(axes: u32) -> impl Iterator<Item = (usize, usize)> {
+    let axes = (0..u16::BITS as usize).filter(move |axis| axes >> axis & 1 != 0);
     axes.enumerate().map(|(member, axis)| (axis, member))
 }
 
-/// Reads all of a program against the limits of the axes.
+/// Reads all of a program against the limits of the axes, as far as they do not
+/// depend on where the axes are.
 ///
 /// # Errors
 /// The first that is wrong, and in which step.
-pub fn check<const N: usize>(bytes: &[u8], config: &GroupConfig<N>) -> Result<(), ProgramError> {
-    let at = |step| move |fault| ProgramError { step, fault };
-    let mut left = steps(bytes, N).map_err(at(0))?;
-    let (mut number, mut depth) = (0, 0);
-    while !left.is_empty() {
-        number += 1;
-        let (one, length) = step(left).map_err(at(number))?;
-        left = left.get(length..).unwrap_or_default();
-        match one {
-            Step::Loop { .. } if depth < LOOPS => depth += 1,
-            Step::EndLoop if depth > 0 => depth -= 1,
-            Step::Loop { .. } | Step::EndLoop => return Err(at(number)(ProgramFault::Loop)),
-            _ => check_step(&one, &config.axes, |axis| config.scale(axis)).map_err(at(number))?,
+pub fn check<const N: usize>(bytes: &[u8], config: &GroupConfig<N>) -> Result<(), PlanError> {
+    let length = bytes.len() as u32;
+    let head = number(bytes, 0);
+    let summed = bytes.len().saturating_sub(CRC);
+    let sum = Crc16::new().update(bytes.get(..summed).unwrap_or_default());
+    let crc = number(bytes, bytes.len().saturating_sub(NUMBER)) >> u16::BITS;
+    let frame = (HEADER + CRC) as u32 + (head >> u16::BITS);
+    let axes = u32::from((head >> u8::BITS) as u8);
+    let cycle = number(bytes, NUMBER);
+    for (fault, value, allowed) in [
+        (Fault::Version, u32::from(head as u8), VERSION.into()),
+        (Fault::Axes, axes, N as u32),
+        (Fault::Length, length, frame),
+        (Fault::Cycle, cycle, config.cycle.as_micros()),
+        (Fault::Checksum, crc, sum.get().into()),
+    ] {
+        if value != allowed {
+            return Err(PlanError::whole(fault, value, allowed));
         }
     }
-    if depth > 0 {
-        return Err(at(number)(ProgramFault::Loop));
+    let steps = steps(bytes);
+    let (mut at, mut number, mut depth) = (0, 0u16, 0u32);
+    while at < steps.len() {
+        number = number.saturating_add(1);
+        let step = Step::at(steps, at);
+        at += step.len();
+        let checked = if at > steps.len() {
+            let end = steps.len() as u32;
+            Err(PlanError::whole(Fault::Length, at as u32, end))
+        } else {
+            check_step(&step, &mut depth, config)
+        };
+        checked.map_err(|error| PlanError {
+            step: number,
+            ..error
+        })?;
     }
-    Ok(())
+    match depth {
+        0 => Ok(()),
+        depth => Err(PlanError::whole(Fault::Loop, depth, 0)),
+    }
 }
 
-/// A step against the limits, as far as they do not depend on where the axes are.
-pub(super) fn check_step(
+#[inline(never)]
+fn check_step<const N: usize>(
     step: &Step<'_>,
-    limits: &[AxisConfig],
-    scale: impl Fn(u8) -> Scale,
-) -> Result<(), ProgramFault> {
-    let axes = match *step {
-        Step::Move { axes, .. } | Step::Home { axes, .. } | Step::Mode { axes, .. } => axes,
-        Step::Generator(generator) => generator.axes,
-        _ => return Ok(()),
-    };
-    if axes == 0 || axes >> limits.len() != 0 {
-        return Err(ProgramFault::UnknownAxis(axes));
+    depth: &mut u32,
+    config: &GroupConfig<N>,
+) -> Result<(), PlanError> {
+    match step.kind {
+        WAIT => return Ok(()),
+        LOOP | END_LOOP => {
+            let deeper = depth.wrapping_add(1);
+            let (now, then) = match step.kind {
+                LOOP => (deeper, deeper),
+                _ => (*depth, depth.wrapping_sub(1)),
+            };
+            *depth = then;
+            return match now {
+                1..=4 => Ok(()),
+                _ => Err(PlanError::whole(Fault::Loop, now, LOOPS as u32)),
+            };
+        }
+        MOVE | PATH | HOME | MODE => {}
+        kind => return Err(PlanError::whole(Fault::Step, kind.into(), MODE.into())),
     }
-    if let Step::Generator(generator) = step
-        && (generator.points == 0 || generator.cycles == 0 || generator.periods == 0)
-    {
-        return Err(ProgramFault::Nothing);
+    if step.axes == 0 || step.axes >> N != 0 {
+        return Err(PlanError::whole(Fault::Members, step.axes, (1 << N) - 1));
     }
-    for (axis, member) in members(axes) {
-        let Some(limit) = limits.get(axis) else {
+    if step.kind == PATH && (step.points() == 0 || step.periods() == 0) {
+        return Err(PlanError::whole(Fault::Points, step.value, 0));
+    }
+    for (axis, member) in members(step.axes) {
+        let Some(limits) = config.axes.get(axis) else {
             continue;
         };
-        let axis = axis as u8;
-        match step {
-            Step::Move { flags, parts, .. } => {
-                let part = part(parts, member).ok_or(ProgramFault::Length)?;
-                let absolute = flags & RELATIVE == 0;
-                part.keeps(axis, limit, absolute)
-                    .map_err(ProgramFault::Limit)?;
+        let absolute = !step.has(RELATIVE);
+        let number = axis as u8;
+        let mode = if step.kind == HOME {
+            Mode::Homing.code()
+        } else {
+            step.flags as i8
+        };
+        match step.kind {
+            MOVE => {
+                let part = step.part(member);
+                part.keeps(number, limits)?;
+                if absolute {
+                    limits.reaches(number, part.target)?;
+                }
             }
-            Step::Generator(generator) => {
-                super::generator::check(generator, member, axis, limit, scale(axis))
-                    .map_err(ProgramFault::Limit)?;
+            PATH => {
+                let begin = absolute.then(|| step.begin(member));
+                step.check_path(number, member, limits, begin)?;
             }
-            Step::Mode { mode, .. } if !mode.is_in(limit.modes) => {
-                return Err(ProgramFault::NoSuchMode(mode.code()));
+            _ if Mode::of(mode).is_some_and(|mode| mode.is_in(limits.modes)) => {}
+            _ => {
+                return Err(PlanError {
+                    axis: number,
+                    ..PlanError::whole(Fault::Mode, mode as u32, limits.modes)
+                });
             }
-            Step::Home { .. } if !Mode::Homing.is_in(limit.modes) => {
-                return Err(ProgramFault::NoSuchMode(Mode::Homing.code()));
-            }
-            _ => {}
         }
-    }
-    Ok(())
-}
-
-/// `value` of a quantity against what is allowed.
-pub(super) fn within(axis: u8, limit: Limit, value: f32, allowed: u32) -> Result<(), PlanError> {
-    if value.abs() > allowed as f32 {
-        return Err(PlanError::OutOfLimits {
-            axis,
-            limit,
-            value: value as i32,
-            allowed,
-        });
     }
     Ok(())
 }

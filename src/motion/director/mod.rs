@@ -5,28 +5,26 @@
 //! meanwhile: a plan says in which of them it begins.
 
 pub mod format;
-mod generator;
 
-use self::format::{FLYING, Generator, ProgramError, ProgramFault, RELATIVE, Step};
-use self::generator::{Begin, Run};
+use self::format::{FLYING, RELATIVE, Step, members};
 use super::group::{Group, Order, SetPoint};
 use super::mode::Mode;
-use super::plan::{self, Knots, Leg};
-use super::program::{AxisMove, Limit, PlanError};
+use super::path::Knot;
+use super::plan::{self, Leg};
+use super::program::{AxisMove, Fault, PlanError, within};
+use super::scale::Scale;
 use super::{GroupConfig, GroupEvent, GroupState, Refusal, fixed};
-use crate::time::Duration;
 use heapless::Vec;
 
 /// Cycles from the look at the group to the first step of the plan; doubled when
 /// that was too short, up to the longest.
 const LEAD: u32 = 2;
-const LEAD_MAX: u32 = 64;
-const US_PER_MS: u32 = 1000;
-/// No axis.
-const NO_LEG: Option<Leg> = None;
+const LATER_MAX: u32 = 62;
+/// Points of a path that are handed over in one look, since the group waits.
+const POINTS: usize = 2;
 
 /// What is being done.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
     /// Nothing.
     Idle,
@@ -34,20 +32,22 @@ enum Phase {
     Released,
     /// The next step of the program is to be read.
     Next,
-    /// Legs are to be planned; the program goes on after that, if one runs.
+    /// Legs are to be planned, or a path is to be checked.
     Plan,
     /// The plan is to be handed over.
     Planned,
-    /// A generator makes knots.
-    Generating,
+    /// It could not be made.
+    Failed,
+    /// The points of a path are handed over.
+    Path,
     /// The axes arrive; at rest, or only their references.
-    Arriving { flying: bool },
-    /// Until the group has made so many steps.
-    Waiting(u32),
-    /// The group comes to standby for an order.
-    Finishing(Option<Order>),
-    /// The group carries out an order given in that step.
-    Ordered(u32),
+    Arriving,
+    /// Until the group has made `until` steps.
+    Waiting,
+    /// The group comes to standby, at the end or for an order.
+    Finishing,
+    /// The group carries out an order given in step `until`.
+    Ordered,
 }
 
 /// A loop of a program: where it begins, and how often it is still run; 0: for
@@ -56,50 +56,73 @@ enum Phase {
 struct Loop {
     begin: usize,
     step: u16,
-    left: u16,
+    left: u32,
 }
 
 /// Plans for a [`Group`].
 pub struct Director<const N: usize> {
-    config: &'static GroupConfig<N>,
+    config: Option<&'static GroupConfig<N>>,
     phase: Phase,
     /// A program runs.
     running: bool,
+    /// A path is to be checked, not a move to be planned.
+    path: bool,
+    flying: bool,
+    number: u16,
     /// Where the step that runs begins, and the next one.
     at: usize,
     next: usize,
-    number: u16,
-    loops: Vec<Loop, { format::LOOPS }>,
-    flying: bool,
-    legs: [Option<Leg>; N],
-    knots: [Knots; N],
-    begin: [Begin; N],
-    run: Run,
+    until: u32,
+    /// The next point of a path, and how often it was followed.
+    point: usize,
+    period: u32,
     start: u32,
-    lead: u32,
-    event: Option<GroupEvent>,
+    /// Cycles more than [`LEAD`].
+    later: u32,
+    /// Cycles until the next look is needed; 0: something happens before.
+    patience: u32,
+    loops: Vec<Loop, { format::LOOPS }>,
+    legs: [Leg; N],
+    /// Where the paths begin, and homes, increments of 6064h.
+    begins: [i32; N],
+    homes: [i32; N],
+    event: Vec<GroupEvent, 1>,
 }
 
 impl<const N: usize> Director<N> {
+    /// Before it is configured: it does nothing.
+    pub const ZERO: Director<N> = Director {
+        config: None,
+        phase: Phase::Idle,
+        running: false,
+        path: false,
+        flying: false,
+        number: 0,
+        at: 0,
+        next: 0,
+        until: 0,
+        point: 0,
+        period: 0,
+        start: 0,
+        later: 0,
+        patience: 0,
+        loops: Vec::new(),
+        legs: [const { Leg::ZERO }; N],
+        begins: [0; N],
+        homes: [0; N],
+        event: Vec::new(),
+    };
+
     /// Nothing is planned.
     pub fn new(config: &'static GroupConfig<N>) -> Director<N> {
-        Director {
-            config,
-            phase: Phase::Idle,
-            running: false,
-            at: 0,
-            next: 0,
-            number: 0,
-            loops: Vec::new(),
-            flying: false,
-            legs: [NO_LEG; N],
-            knots: [const { Vec::new() }; N],
-            begin: [Begin::default(); N],
-            run: Run::default(),
-            start: 0,
-            lead: LEAD,
-            event: None,
-        }
+        let mut director = Director::ZERO;
+        director.configure(config);
+        director
+    }
+
+    /// Makes the same of [`Director::ZERO`], where it is to stay.
+    pub const fn configure(&mut self, config: &'static GroupConfig<N>) {
+        self.config = Some(config);
     }
 
     /// The step of the program that runs, counted from 1; 0: none.
@@ -107,9 +130,15 @@ impl<const N: usize> Director<N> {
         if self.running { self.number } else { 0 }
     }
 
+    /// Cycles after which the group is to be looked at again, if nothing happens
+    /// until then; 0: as many as one likes.
+    pub const fn patience(&self) -> u32 {
+        self.patience
+    }
+
     /// What it has to report: to be taken after every round.
     pub fn take_event(&mut self) -> Option<GroupEvent> {
-        self.event.take()
+        self.event.pop()
     }
 
     /// Releases the group and runs a program once; a halted one goes on with the
@@ -120,11 +149,37 @@ impl<const N: usize> Director<N> {
     pub fn run(&mut self, group: &mut Group<N>) -> Result<(), Refusal> {
         group.order(Order::Release)?;
         if !(self.running && group.state() == GroupState::Halt) {
-            self.running = true;
-            (self.at, self.number) = (0, 0);
-            self.loops.clear();
+            self.restart();
         }
         self.phase = Phase::Released;
+        Ok(())
+    }
+
+    /// Runs a program once, the group being released.
+    ///
+    /// # Errors
+    /// [`Refusal`] if it is not, or does something else.
+    pub fn start(&mut self, group: &Group<N>) -> Result<(), Refusal> {
+        self.is_free(group)?;
+        self.restart();
+        self.phase = Phase::Released;
+        Ok(())
+    }
+
+    fn restart(&mut self) {
+        self.running = true;
+        (self.at, self.number) = (0, 0);
+        self.loops.clear();
+    }
+
+    /// Whether it can be told to move.
+    fn is_free(&self, group: &Group<N>) -> Result<(), Refusal> {
+        if group.state() != GroupState::Moving {
+            return Err(Refusal::NotIn(group.state()));
+        }
+        if self.running || matches!(self.phase, Phase::Plan | Phase::Planned) {
+            return Err(Refusal::Busy);
+        }
         Ok(())
     }
 
@@ -141,21 +196,15 @@ impl<const N: usize> Director<N> {
         relative: bool,
         jerk: u32,
     ) -> Result<(), Refusal> {
-        if group.state() != GroupState::Moving {
-            return Err(Refusal::NotIn(group.state()));
-        }
-        if self.running || matches!(self.phase, Phase::Plan | Phase::Planned) {
-            return Err(Refusal::Busy);
-        }
+        self.is_free(group)?;
+        self.clear();
         for (axis, part) in parts.iter().enumerate() {
-            let leg = part
-                .as_ref()
-                .map(|part| self.leg(group, axis, part, relative, jerk));
-            if let Some(place) = self.legs.get_mut(axis) {
-                *place = leg.transpose().map_err(Refusal::Program)?;
+            if let Some(part) = part {
+                let set = self.set_leg(group, axis, part, relative, jerk);
+                set.map_err(Refusal::Program)?;
             }
         }
-        self.flying = false;
+        (self.path, self.flying) = (false, false);
         self.phase = Phase::Plan;
         Ok(())
     }
@@ -163,8 +212,8 @@ impl<const N: usize> Director<N> {
     /// All of it, for whoever has the group for himself.
     pub fn round(&mut self, group: &mut Group<N>, program: &[u8]) {
         if self.look(group, program) {
-            self.think();
-            self.act(group);
+            self.think(program);
+            self.act(group, program);
         }
     }
 
@@ -172,40 +221,58 @@ impl<const N: usize> Director<N> {
     /// `program` are its bytes, as [`format::check`] took them; while it runs it has
     /// to stay the same. Whether there is something to plan.
     pub fn look(&mut self, group: &mut Group<N>, program: &[u8]) -> bool {
-        let steps = format::body(program);
+        let steps = format::steps(program);
+        self.patience = 0;
         match (self.phase, group.state()) {
-            (Phase::Idle, _) => {}
-            (Phase::Released, GroupState::Moving) => {
-                self.next = self.at;
-                self.phase = Phase::Next;
-            }
-            (Phase::Released, GroupState::Standby | GroupState::Halt) => {}
-            (Phase::Finishing(_) | Phase::Ordered(_), GroupState::Standby) => self.standby(group),
-            (Phase::Ordered(_), GroupState::Homing | GroupState::ModeChange) => {}
+            (Phase::Idle, _) => return false,
+            (Phase::Ordered, GroupState::Homing | GroupState::ModeChange)
+            | (Phase::Released, GroupState::Standby) => {}
+            (Phase::Finishing | Phase::Ordered, GroupState::Standby) => self.standby(group, steps),
             (_, GroupState::Moving) => self.moving(group),
+            (Phase::Released, GroupState::Halt) => {}
             // The step that is interrupted begins again with the next release.
-            (_, GroupState::Halt) if self.running => self.number = self.number.saturating_sub(1),
-            _ => {
-                self.phase = Phase::Idle;
-                self.running = false;
+            (_, GroupState::Halt) if self.running => {
+                self.number = self.number.saturating_sub(1);
+                self.phase = Phase::Released;
+            }
+            _ => self.end(),
+        }
+        match self.phase {
+            Phase::Next => self.read(group, steps),
+            Phase::Path => self.feed(group, &Step::at(steps, self.at)),
+            _ => {}
+        }
+        let mut plan = false;
+        if self.phase == Phase::Plan {
+            self.patience = 1;
+            match self.predict(group, &Step::at(steps, self.at)) {
+                Ok(ready) => plan = ready,
+                error => self.judge(error.map(drop)),
             }
         }
-        if group.state() == GroupState::Halt && self.running {
-            self.phase = Phase::Released;
+        match self.phase {
+            Phase::Next | Phase::Path => self.patience = 1,
+            Phase::Waiting => self.patience = self.until.wrapping_sub(group.count()).max(1),
+            Phase::Failed => self.give_up(group),
+            _ => {}
         }
-        if matches!(self.phase, Phase::Next) {
-            self.read(group, steps);
-        }
-        if matches!(self.phase, Phase::Generating) {
-            self.generate(group, steps);
-        }
-        matches!(self.phase, Phase::Plan) && self.predict(group)
+        plan
+    }
+
+    /// Nothing is to be done any more.
+    fn end(&mut self) {
+        self.phase = Phase::Idle;
+        self.running = false;
     }
 
     fn moving(&mut self, group: &mut Group<N>) {
         match self.phase {
-            Phase::Arriving { flying } => {
-                let there = if flying {
+            Phase::Released => {
+                self.next = self.at;
+                self.phase = Phase::Next;
+            }
+            Phase::Arriving => {
+                let there = if self.flying {
                     group.all_over()
                 } else {
                     group.all_arrived()
@@ -218,10 +285,10 @@ impl<const N: usize> Director<N> {
                     };
                 }
             }
-            Phase::Waiting(until) if group.count().wrapping_sub(until) as i32 >= 0 => {
+            Phase::Waiting if group.count().wrapping_sub(self.until) as i32 >= 0 => {
                 self.phase = Phase::Next;
             }
-            Phase::Finishing(_) if group.all_arrived() => {
+            Phase::Finishing if group.all_arrived() => {
                 // Refused only while another order waits.
                 let _ = group.order(Order::Finish);
             }
@@ -230,204 +297,111 @@ impl<const N: usize> Director<N> {
     }
 
     /// In standby in the middle or at the end of a program.
-    fn standby(&mut self, group: &mut Group<N>) {
-        match self.phase {
-            Phase::Finishing(None) => {
-                self.phase = Phase::Idle;
-                self.running = false;
-                self.event = Some(GroupEvent::ProgramDone);
-            }
-            Phase::Finishing(Some(order)) => match group.order(order) {
-                Ok(()) => self.phase = Phase::Ordered(group.count()),
-                Err(_) => self.phase = Phase::Idle,
-            },
+    fn standby(&mut self, group: &mut Group<N>, steps: &[u8]) {
+        let count = group.count();
+        if self.phase == Phase::Ordered {
             // The release of the program counts until its end.
-            Phase::Ordered(count)
-                if count != group.count() && group.order(Order::Release).is_ok() =>
-            {
+            if count != self.until && group.order(Order::Release).is_ok() {
                 self.at = self.next;
                 self.phase = Phase::Released;
             }
-            _ => {}
+            return;
+        }
+        let step = Step::at(steps, self.at);
+        let axes = step.axes;
+        let order = match (step.kind, Mode::of(step.flags as i8)) {
+            (format::HOME, _) => Order::Home {
+                axes,
+                limit: step.value,
+            },
+            (format::MODE, Some(mode)) => Order::SetMode { axes, mode },
+            _ => {
+                self.end();
+                self.report(GroupEvent::ProgramDone);
+                return;
+            }
+        };
+        (self.phase, self.until) = (Phase::Ordered, count);
+        if let Err(why) = group.order(order) {
+            self.end();
+            self.report(GroupEvent::ReleaseRefused(why));
         }
     }
 
     /// Begins the next step of the program.
-    fn read(&mut self, group: &mut Group<N>, steps: &[u8]) {
-        let left = steps.get(self.next..).unwrap_or_default();
-        if left.is_empty() {
-            self.phase = Phase::Finishing(None);
-            return;
-        }
-        self.number = self.number.saturating_add(1);
+    fn read(&mut self, group: &Group<N>, steps: &[u8]) {
         self.at = self.next;
-        match self.begin(group, left) {
-            Ok(phase) => {
-                self.event = Some(GroupEvent::StepStarted {
-                    step: self.number.wrapping_sub(1) as u8,
-                });
-                self.phase = phase;
-            }
-            Err(fault) => self.fail(group, fault),
+        let step = Step::at(steps, self.at);
+        self.next = self.at.saturating_add(step.len());
+        if self.at < steps.len() {
+            self.number = self.number.saturating_add(1);
+            self.report(GroupEvent::StepStarted {
+                step: self.number.wrapping_sub(1) as u8,
+            });
         }
-    }
-
-    fn fail(&mut self, group: &mut Group<N>, fault: ProgramFault) {
-        self.event = Some(GroupEvent::ProgramFailed(ProgramError {
-            step: self.number,
-            fault,
-        }));
-        self.phase = Phase::Idle;
-        self.running = false;
-        // The group moves: a stop is never refused.
-        let _ = group.order(Order::Stop);
-    }
-
-    #[inline(never)]
-    fn begin(&mut self, group: &mut Group<N>, left: &[u8]) -> Result<Phase, ProgramFault> {
-        let (step, length) = format::step(left)?;
-        self.next += length;
-        let config = self.config;
-        format::check_step(&step, &config.axes, |axis| config.scale(axis))?;
-        Ok(match step {
-            Step::Move {
-                flags,
-                axes,
-                jerk,
-                parts,
-            } => {
-                self.legs = [NO_LEG; N];
-                for (axis, member) in format::members(axes) {
-                    let part = format::part(parts, member).ok_or(ProgramFault::Length)?;
-                    let leg = self.leg(group, axis, &part, flags & RELATIVE != 0, jerk);
-                    if let Some(place) = self.legs.get_mut(axis) {
-                        *place = Some(leg.map_err(ProgramFault::Limit)?);
-                    }
-                }
-                self.flying = flags & FLYING != 0;
-                Phase::Plan
+        self.flying = step.has(FLYING);
+        self.path = step.kind == format::PATH;
+        self.phase = match step.kind {
+            format::MOVE => {
+                let set = self.set_legs(group, &step);
+                self.phase = Phase::Plan;
+                return self.judge(set);
             }
-            Step::Wait { ms } => {
-                let time = Duration::from_micros(ms.saturating_mul(US_PER_MS));
-                Phase::Waiting(group.count().wrapping_add(config.cycles(time)))
+            format::PATH => Phase::Plan,
+            format::WAIT => {
+                self.until = group.count().wrapping_add(step.value);
+                Phase::Waiting
             }
-            Step::Loop { times } => {
-                let begun = self.loops.push(Loop {
+            format::LOOP => {
+                // There is room, as the check has found.
+                let _ = self.loops.push(Loop {
                     begin: self.next,
                     step: self.number,
-                    left: times,
+                    left: step.value,
                 });
-                begun.map_err(|_| ProgramFault::Loop)?;
                 Phase::Next
             }
-            Step::EndLoop => {
-                let last = self.loops.last_mut().ok_or(ProgramFault::Loop)?;
-                if last.left == 1 {
-                    self.loops.pop();
-                } else {
-                    last.left = last.left.saturating_sub(1);
-                    (self.next, self.number) = (last.begin, last.step);
+            format::END_LOOP => {
+                match self.loops.last_mut() {
+                    Some(last) if last.left != 1 => {
+                        last.left = last.left.saturating_sub(1);
+                        (self.next, self.number) = (last.begin, last.step);
+                    }
+                    _ => drop(self.loops.pop()),
                 }
                 Phase::Next
             }
-            Step::Generator(generator) => {
-                self.begin_generator(group, &generator)?;
-                Phase::Generating
-            }
-            Step::Home { axes, ms } => {
-                let time = Duration::from_micros(ms.saturating_mul(US_PER_MS));
-                let limit = config.cycles(time);
-                Phase::Finishing(Some(Order::Home { axes, limit }))
-            }
-            Step::Mode { axes, mode } => Phase::Finishing(Some(Order::SetMode { axes, mode })),
-        })
-    }
-
-    /// The leg of an axis, checked against its limits.
-    fn leg(
-        &self,
-        group: &Group<N>,
-        axis: usize,
-        part: &AxisMove,
-        relative: bool,
-        jerk: u32,
-    ) -> Result<Leg, PlanError> {
-        let (Some(limits), Some(view)) = (self.config.axes.get(axis), group.view(axis)) else {
-            return Err(PlanError::TooLong { axis: axis as u8 });
+            // In standby, as is the end.
+            _ => Phase::Finishing,
         };
-        let number = axis as u8;
-        let mut part = *part;
-        let torque = view.mode == Mode::CyclicTorque;
-        let home = if torque { 0 } else { view.home };
-        if relative {
-            let from = view.end.wrapping_sub(home);
-            part.target = part.target.saturating_add(from);
-        }
-        part.keeps(number, limits, true)?;
-        let scale = self.config.scale(number);
-        let mut leg = part.leg(scale);
-        leg.target = leg.target.wrapping_add(home);
-        leg.jerk = scale.per_cycle(scale.acceleration(jerk as f32));
-        if torque {
-            format::within(
-                number,
-                Limit::Torque,
-                part.target as f32,
-                limits.torque_max.into(),
-            )?;
-            leg.velocity = scale.per_cycle(part.velocity as f32);
-            leg.acceleration = scale.per_cycle(scale.per_cycle(part.acceleration as f32));
-            leg.deceleration = scale.per_cycle(scale.per_cycle(part.deceleration as f32));
-        }
-        Ok(leg)
     }
 
-    /// Where the paths will stand when the plan begins; `false` if nothing has to
-    /// be planned.
-    fn predict(&mut self, group: &mut Group<N>) -> bool {
-        self.start = group.count().wrapping_add(self.lead);
-        for (axis, leg) in self.legs.iter_mut().enumerate() {
-            let Some(some) = leg else { continue };
-            let Some(view) = group.view(axis) else {
-                continue;
-            };
-            if let Some(begin) = self.begin.get_mut(axis) {
-                begin.home = view.home;
-            }
-            if view.mode == Mode::ProfilePosition {
-                let set_point = SetPoint {
-                    target: some.target,
-                    immediately: true,
-                    relative: false,
-                };
-                let scale = self.config.scale(axis as u8);
-                let up = scale.rpm_per_s(some.acceleration);
-                group.set_ramps(axis, up, scale.rpm_per_s(some.deceleration));
-                if !group.ask(axis, &set_point) {
-                    return false;
-                }
-                *leg = None;
-                continue;
-            }
-            some.from = group.predict(axis, self.lead - 1).unwrap_or_default();
+    fn set_legs(&mut self, group: &Group<N>, step: &Step<'_>) -> Result<(), PlanError> {
+        self.clear();
+        let relative = step.has(RELATIVE);
+        for (axis, member) in members(step.axes) {
+            self.set_leg(group, axis, &step.part(member), relative, step.value)?;
         }
-        true
+        Ok(())
     }
 
-    /// Plans what there is to plan.
-    pub fn think(&mut self) {
-        let planned = plan::plan(&self.legs, &mut self.knots);
-        let error = match planned {
-            Ok(_) => self.beyond(),
-            Err(plan::TooLong { leg }) => Some(PlanError::TooLong { axis: leg }),
-        };
-        self.phase = Phase::Planned;
-        if let Some(error) = error {
-            self.phase = Phase::Idle;
-            self.event = Some(if self.running {
-                GroupEvent::ProgramFailed(ProgramError {
+    /// The last counts.
+    #[inline(never)]
+    fn report(&mut self, event: GroupEvent) {
+        self.event.clear();
+        // There is room.
+        let _ = self.event.push(event);
+    }
+
+    /// What went wrong is reported.
+    #[inline(never)]
+    fn judge(&mut self, result: Result<(), PlanError>) {
+        if let Err(error) = result {
+            self.phase = Phase::Failed;
+            self.report(if self.running {
+                GroupEvent::ProgramFailed(PlanError {
                     step: self.number,
-                    fault: ProgramFault::Limit(error),
+                    ..error
                 })
             } else {
                 GroupEvent::MoveRefused(error)
@@ -435,146 +409,234 @@ impl<const N: usize> Director<N> {
         }
     }
 
-    /// An axis that would turn around outside of its travel.
-    fn beyond(&self) -> Option<PlanError> {
-        let legs = self.legs.iter().zip(&self.knots).zip(&self.config.axes);
-        for (axis, ((leg, knots), limits)) in legs.enumerate() {
-            let Some(leg) = leg else { continue };
-            let Some(turn) = plan::turning_point(&leg.from, knots) else {
+    /// After that: a program ends; a move that cannot be made leaves everything as
+    /// it is.
+    fn give_up(&mut self, group: &mut Group<N>) {
+        if self.running {
+            // The group moves: a stop is never refused.
+            let _ = group.order(Order::Stop);
+        }
+        self.end();
+    }
+
+    fn clear(&mut self) {
+        for leg in &mut self.legs {
+            leg.set = None;
+        }
+    }
+
+    /// The leg of an axis, checked against its limits.
+    #[inline(never)]
+    fn set_leg(
+        &mut self,
+        group: &Group<N>,
+        axis: usize,
+        part: &AxisMove,
+        relative: bool,
+        jerk: u32,
+    ) -> Result<(), PlanError> {
+        let number = axis as u8;
+        let (Some(config), Some(view), Some(leg)) =
+            (self.config, group.view(axis), self.legs.get_mut(axis))
+        else {
+            return Ok(());
+        };
+        let Some(limits) = config.axes.get(axis) else {
+            return Ok(());
+        };
+        let torque = view.mode == Mode::CyclicTorque;
+        let (home, scale) = if torque {
+            (0, Scale::per_second(config.cycle))
+        } else {
+            (view.home, limits.scale)
+        };
+        let mut target = part.target;
+        if relative {
+            target = target.saturating_add(view.end.wrapping_sub(home));
+        }
+        part.keeps(number, limits)?;
+        if torque {
+            let value = target.unsigned_abs().max(1);
+            within(number, Fault::Torque, value, limits.torque_max.into())?;
+        } else {
+            limits.reaches(number, target)?;
+        }
+        leg.set = Some(part.set);
+        leg.target = target.wrapping_add(home);
+        [leg.velocity, leg.acceleration, leg.deceleration] = part.limits(scale);
+        leg.jerk = scale.per_cycle(scale.acceleration(jerk as f32));
+        Ok(())
+    }
+
+    /// Where the paths will stand when the plan begins, and what is left to the
+    /// drives; `false` if one has not taken its last set-point yet.
+    #[inline(never)]
+    fn predict(&mut self, group: &mut Group<N>, step: &Step<'_>) -> Result<bool, PlanError> {
+        let (lead, config) = (LEAD + self.later, self.config);
+        self.start = group.count().wrapping_add(lead);
+        let places = self.begins.iter_mut().zip(&mut self.homes);
+        for (axis, (leg, (begin, home))) in self.legs.iter_mut().zip(places).enumerate() {
+            let Some(view) = group.view(axis) else {
                 continue;
             };
-            let begin = self.begin.get(axis).copied().unwrap_or_default();
-            let value = fixed::round(turn).wrapping_sub(begin.home);
-            if let Err(error) = limits.reaches(axis as u8, value) {
-                return Some(error);
+            (*begin, *home) = (view.reference, view.home);
+            let number = axis as u8;
+            if self.path {
+                // Its drive moves it by itself, or it is no motion.
+                if step.axes >> axis & 1 != 0 && !view.mode.has_position() {
+                    let mode = u32::from(view.mode as u8);
+                    return Err(PlanError {
+                        axis: number,
+                        ..PlanError::whole(Fault::Mode, mode, Mode::WITH_POSITION)
+                    });
+                }
+            } else if leg.set.is_some() && view.mode == Mode::ProfilePosition {
+                let scale = scale(config, axis);
+                let up = scale.rpm_per_s(leg.acceleration);
+                group.set_ramps(axis, up, scale.rpm_per_s(leg.deceleration));
+                let set_point = SetPoint {
+                    target: leg.target,
+                    immediately: true,
+                    relative: false,
+                };
+                if !group.ask(axis, &set_point) {
+                    return Ok(false);
+                }
+                leg.set = None;
+            } else if leg.set.is_some() {
+                leg.from = group.predict(axis, lead - 1).unwrap_or_default();
             }
         }
-        None
+        Ok(true)
+    }
+
+    /// Plans what there is to plan, and checks it against the travel from where the
+    /// axes are.
+    pub fn think(&mut self, program: &[u8]) {
+        let step = Step::at(format::steps(program), self.at);
+        self.phase = Phase::Planned;
+        let result = if self.path {
+            self.check_path(&step)
+        } else {
+            self.plan()
+        };
+        self.judge(result);
+    }
+
+    fn plan(&mut self) -> Result<(), PlanError> {
+        plan::plan(&mut self.legs).map_err(|axis| PlanError {
+            axis,
+            ..PlanError::whole(Fault::Time, u32::MAX, plan::CYCLES_MAX)
+        })?;
+        let places = self.legs.iter().zip(&self.homes);
+        let axes = self.config.map_or(&[][..], |config| &config.axes);
+        for (axis, ((leg, home), limits)) in (0..).zip(places.zip(axes)) {
+            if leg.set.is_some() && leg.turn != 0.0 {
+                let from = fixed::round(leg.from.position).wrapping_sub(*home);
+                limits.reaches(axis, from.saturating_add(leg.turn as i32))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn check_path(&mut self, step: &Step<'_>) -> Result<(), PlanError> {
+        let places = self.begins.iter().zip(&self.homes).zip(&mut self.legs);
+        let axes = self.config.map_or(&[][..], |config| &config.axes);
+        let mut member = 0;
+        for (axis, (((begin, home), leg), limits)) in places.zip(axes).enumerate() {
+            if step.axes >> axis & 1 == 0 {
+                continue;
+            }
+            let number = axis as u8;
+            let begin = begin.wrapping_sub(*home);
+            let told = step.begin(member);
+            if !step.has(RELATIVE) && begin != told {
+                return Err(PlanError {
+                    axis: number,
+                    ..PlanError::whole(Fault::Begin, begin as u32, told as u32)
+                });
+            }
+            let slope = step.check_path(number, member, limits, Some(begin))?;
+            (leg.up, leg.down) = (slope, slope);
+            member += 1;
+        }
+        Ok(())
     }
 
     /// Hands the plan over. Too late for its first step, it is made anew.
-    pub fn act(&mut self, group: &mut Group<N>) {
-        if !matches!(self.phase, Phase::Planned) {
-            if self.running && matches!(self.phase, Phase::Idle) {
-                self.running = false;
-                let _ = group.order(Order::Stop);
-            }
-            return;
+    pub fn act(&mut self, group: &mut Group<N>, program: &[u8]) {
+        match self.phase {
+            Phase::Failed => return self.give_up(group),
+            Phase::Planned => {}
+            _ => return,
         }
-        let axes = mask(self.legs.iter().map(Option::is_some));
-        if group.announce(self.start, axes).is_err() {
-            self.lead = LEAD_MAX.min(self.lead * 2);
+        let step = Step::at(format::steps(program), self.at);
+        let mut axes = step.axes;
+        if !self.path {
+            axes = 0;
+            for (axis, leg) in self.legs.iter().enumerate() {
+                axes |= u32::from(leg.set.is_some()) << axis;
+            }
+        }
+        // A path begins at rest: the sooner, the better.
+        let start = if self.path {
+            group.count().wrapping_add(1)
+        } else {
+            self.start
+        };
+        if group.announce(start, axes).is_err() {
+            self.later = LATER_MAX.min(self.later * 2 + LEAD);
             self.phase = Phase::Plan;
             return;
         }
-        let plans = self.legs.iter().zip(&self.knots);
-        for (axis, (leg, knots)) in plans.enumerate() {
-            let Some(leg) = leg else { continue };
-            let scale = self.config.scale(axis as u8);
-            let (mut up, mut down) = (0.0f32, 0.0f32);
-            let mut speed = fixed::float(leg.from.velocity);
-            for knot in knots {
-                group.push(axis, knot);
-                let next = fixed::float(knot.velocity);
-                let slope = (next - speed).abs() / knot.cycles.max(1) as f32;
-                if next.abs() > speed.abs() {
-                    up = up.max(slope);
-                } else {
-                    down = down.max(slope);
-                }
-                speed = next;
-            }
-            if leg.jerk > 0.0 {
-                // In between it is steeper.
-                (up, down) = (leg.acceleration, leg.deceleration);
-            }
-            group.set_ramps(axis, scale.rpm_per_s(up), scale.rpm_per_s(down));
-        }
-        self.phase = Phase::Arriving {
-            flying: self.flying,
-        };
-    }
-
-    /// A generator begins where the axes are.
-    fn begin_generator(
-        &mut self,
-        group: &mut Group<N>,
-        generator: &Generator<'_>,
-    ) -> Result<(), ProgramFault> {
-        for (axis, begin) in self.begin.iter_mut().enumerate() {
-            if let Some(view) = group.view(axis) {
-                begin.from = view.reference;
-                begin.home = view.home;
-            }
-        }
         let config = self.config;
-        let scale = |axis| config.scale(axis as u8);
-        self.run = Run::new(generator, &self.begin, &scale);
-        self.reach(generator)?;
-        for (axis, member) in format::members(generator.axes) {
-            // As steep as the limits let it be, where nothing else is told.
-            let slope = generator::slope(generator, member, scale(axis)).unwrap_or(
-                config
-                    .axes
-                    .get(axis)
-                    .map_or(0.0, |a| a.acceleration_max as f32),
-            );
-            group.set_ramps(axis, slope, slope);
-        }
-        let start = group.count().wrapping_add(1);
-        // The next step cannot have passed.
-        let _ = group.announce(start, generator.axes);
-        Ok(())
-    }
-
-    /// Whether the travel allows what begins where the axes are.
-    fn reach(&self, generator: &Generator<'_>) -> Result<(), ProgramFault> {
-        for (axis, member) in format::members(generator.axes) {
-            let begin = self.begin.get(axis).copied().unwrap_or_default();
-            let from = begin.from.wrapping_sub(begin.home);
-            let Some(limits) = self.config.axes.get(axis) else {
+        for (axis, leg) in self.legs.iter().enumerate() {
+            if axes >> axis & 1 == 0 {
                 continue;
-            };
-            for way in generator::reach(generator, member) {
-                let farthest = from.saturating_add(way);
-                let reached = limits.reaches(axis as u8, farthest);
-                reached.map_err(ProgramFault::Limit)?;
             }
-        }
-        Ok(())
-    }
-
-    /// Makes as many knots as there is room for.
-    fn generate(&mut self, group: &mut Group<N>, steps: &[u8]) {
-        let Ok((Step::Generator(generator), _)) =
-            format::step(steps.get(self.at..).unwrap_or_default())
-        else {
-            return;
-        };
-        let config = self.config;
-        let scale = |axis| config.scale(axis as u8);
-        let room = |group: &Group<N>| {
-            let mut axes = format::members(generator.axes);
-            axes.all(|(axis, _)| group.room(axis) > 0)
-        };
-        while room(group) {
-            for (axis, member) in format::members(generator.axes) {
-                match self.run.next(&generator, &self.begin, &scale, axis, member) {
-                    Some(knot) => group.push(axis, &knot),
-                    None => {
-                        self.phase = Phase::Arriving { flying: false };
-                        return;
-                    }
+            let scale = scale(config, axis);
+            group.set_ramps(axis, scale.rpm_per_s(leg.up), scale.rpm_per_s(leg.down));
+            if !self.path {
+                for knot in &leg.knots {
+                    group.push(axis, knot);
                 }
             }
-            self.run.knot += 1;
+        }
+        self.phase = Phase::Arriving;
+        if self.path {
+            (self.point, self.period) = (0, 0);
+            self.phase = Phase::Path;
+            self.feed(group, &step);
+        }
+    }
+
+    /// Hands over the next points of a path, if there is room.
+    fn feed(&mut self, group: &mut Group<N>, step: &Step<'_>) {
+        for _ in 0..POINTS {
+            if self.period == step.periods() {
+                self.phase = Phase::Arriving;
+                return;
+            }
+            for (axis, member) in members(step.axes) {
+                if group.room(axis) == 0 {
+                    return;
+                }
+                let knot = step.point(member, self.point);
+                let begin = self.begins.get(axis).copied().unwrap_or_default();
+                let position = fixed::whole(begin).wrapping_add(knot.position);
+                group.push(axis, &Knot { position, ..knot });
+            }
+            self.point += 1;
+            if self.point == step.points() {
+                self.point = 0;
+                self.period += 1;
+            }
         }
     }
 }
 
-/// A set: bit n for the n-th that is in it.
-fn mask(members: impl Iterator<Item = bool>) -> u32 {
-    members
-        .enumerate()
-        .fold(0, |set, (n, is)| set | u32::from(is) << n)
+/// The units of an axis.
+fn scale<const N: usize>(config: Option<&GroupConfig<N>>, axis: usize) -> Scale {
+    let limits = config.and_then(|config| config.axes.get(axis));
+    limits.map_or(Scale::ONE, |limits| limits.scale)
 }

@@ -1,0 +1,158 @@
+//! What a program does to the axes: where they come to rest, and when it is done.
+
+use super::axes::{CYCLIC_TORQUE, Group};
+use super::{Action, Program, Step, timing};
+
+/// Between the end of a reference and the next step when nothing disturbs the axes:
+/// delay of the loop, last increments, confirmation, planning.
+const SETTLING_CYCLES: u64 = 14;
+/// A mode is written, confirmed, and the group released again.
+const MODE_MS: f64 = 400.0;
+/// A rest that everybody sees, ms; a shorter one may be none.
+const REST_MS: f64 = 150.0;
+/// What is done for ever is done so often here.
+const FOR_EVER: u16 = 2;
+/// More is not unrolled.
+const STEPS_MAX: usize = 100_000;
+
+/// A program from its release to its end, if it begins at home.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Course {
+    /// Rests, one after the other: for each axis that came there since the last,
+    /// where it has to be.
+    pub rests: Vec<Vec<Option<Stop>>>,
+    /// How long it takes, in SYNC cycles.
+    pub cycles: u64,
+    /// It does not end by itself, or is too long to be followed.
+    pub endless: bool,
+}
+
+/// Where an axis comes to rest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Stop {
+    /// Increments from home.
+    pub target: i32,
+    /// Axes of one set stop together.
+    pub set: u8,
+}
+
+/// While it is followed.
+struct Walk<'a> {
+    group: &'a Group,
+    course: Course,
+    at: Vec<i64>,
+    modes: Vec<u8>,
+    /// Since the last rest.
+    moved: Vec<Option<Stop>>,
+    left: usize,
+}
+
+impl Program {
+    /// What it does to the axes of `group`, for which it is made.
+    pub fn course(&self, group: &Group) -> Course {
+        let mut walk = Walk {
+            group,
+            course: Course::default(),
+            at: vec![0; self.axes],
+            modes: group.axes.iter().map(|axis| axis.mode).collect(),
+            moved: vec![None; self.axes],
+            left: STEPS_MAX,
+        };
+        walk.steps(&self.steps);
+        walk.rest();
+        walk.course
+    }
+}
+
+impl Walk<'_> {
+    /// Whoever moved since the last rest is seen to rest.
+    fn rest(&mut self) {
+        if self.moved.iter().any(Option::is_some) {
+            let moved = std::mem::replace(&mut self.moved, vec![None; self.at.len()]);
+            self.course.rests.push(moved);
+        }
+    }
+
+    fn go(&mut self, axis: usize, to: i64, set: u8) {
+        if self.modes[axis] == CYCLIC_TORQUE {
+            return;
+        }
+        if to != self.at[axis] {
+            self.moved[axis] = Some(Stop {
+                target: to as i32,
+                set,
+            });
+        }
+        self.at[axis] = to;
+    }
+
+    fn steps(&mut self, steps: &[Step]) {
+        for step in steps {
+            if self.left == 0 {
+                self.course.endless = true;
+                return;
+            }
+            self.left -= 1;
+            self.action(&step.action);
+        }
+    }
+
+    fn action(&mut self, action: &Action) {
+        match action {
+            Action::Move(a_move) => {
+                let cycles = timing::cycles(self.group, a_move, &self.at);
+                for part in &a_move.parts {
+                    let from = if a_move.relative { self.at[part.axis] } else { 0 };
+                    self.go(part.axis, from + i64::from(part.target), part.set);
+                }
+                self.course.cycles += u64::from(cycles) + SETTLING_CYCLES;
+            }
+            Action::Wait { cycles } => {
+                if *cycles >= self.group.cycles(REST_MS) {
+                    self.rest();
+                }
+                self.course.cycles += u64::from(*cycles);
+            }
+            Action::Repeat { times, steps } => {
+                self.course.endless |= *times == 0;
+                let times = if *times == 0 { FOR_EVER } else { *times };
+                for _ in 0..times {
+                    self.steps(steps);
+                }
+            }
+            Action::Path(path) => {
+                let cycles = path.points.iter().map(|point| u64::from(point.cycles));
+                self.course.cycles += cycles.sum::<u64>() * u64::from(path.periods);
+                self.course.cycles += SETTLING_CYCLES;
+                for (member, of) in path.members.iter().enumerate() {
+                    let end = path.points.last().map_or(0.0, |last| path.at(member, last).0);
+                    let to = self.at[of.axis] + end.round() as i64;
+                    self.go(of.axis, to, 0);
+                    // It moved, wherever it ends.
+                    let target = self.at[of.axis] as i32;
+                    self.moved[of.axis] = Some(Stop { target, set: 0 });
+                }
+            }
+            Action::Home { axes, limit } => {
+                self.rest();
+                for axis in 0..self.at.len() {
+                    if axes >> axis & 1 != 0 {
+                        self.at[axis] = 0;
+                    }
+                }
+                self.course.cycles += u64::from(*limit);
+            }
+            Action::Mode { axes, mode } => {
+                self.rest();
+                for (axis, of) in self.modes.iter_mut().enumerate() {
+                    if axes >> axis & 1 != 0 {
+                        *of = *mode;
+                    }
+                }
+                self.course.cycles += u64::from(self.group.cycles(MODE_MS));
+            }
+        }
+    }
+}

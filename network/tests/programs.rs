@@ -1,0 +1,202 @@
+//! Motion programs: those of the project, their bytes, and what is refused.
+
+use std::path::{Path, PathBuf};
+
+use canmaster::motion::experiment::GROUP;
+use canmaster::motion::format;
+use canmaster_network::model::Machine;
+use canmaster_network::program::{self, Action, Group, Program};
+use canmaster_network::{Severity, Source, load, read_for_firmware};
+
+fn workspace() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+fn sample() -> Machine {
+    load(&workspace().join("network.toml")).machine.unwrap()
+}
+
+fn words(problems: &[canmaster_network::Problem]) -> String {
+    let words: Vec<String> = problems.iter().map(ToString::to_string).collect();
+    words.join("\n\n")
+}
+
+fn of_project(name: &str) -> Program {
+    let path = workspace().join("programs").join(name);
+    let outcome = program::load(&path, &sample());
+    assert!(outcome.problems.is_empty(), "{}", words(&outcome.problems));
+    outcome.program.unwrap()
+}
+
+fn compiled(text: &str) -> Program {
+    let outcome = program::read(&Source::new("p.toml", text.as_bytes()), &sample());
+    assert!(outcome.problems.is_empty(), "{}", words(&outcome.problems));
+    outcome.program.unwrap()
+}
+
+/// All of them are taken by the firmware's own check.
+#[test]
+fn the_programs_of_the_project_are_valid() {
+    let mut names: Vec<String> = std::fs::read_dir(workspace().join("programs"))
+        .unwrap()
+        .map(|file| file.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    assert_eq!(names, ["homing.toml", "pairs.toml", "sine.toml", "six_axes.toml"]);
+    for name in names {
+        let program = of_project(&name);
+        assert_eq!(format::check(&program.bytes(), &GROUP), Ok(()), "{name}");
+        let group = Group::of(&sample()).unwrap();
+        let course = program.course(&group);
+        assert!(!course.endless && course.cycles > 0, "{name}");
+    }
+}
+
+/// The program that needs no file is the one in the file.
+#[test]
+fn an_image_without_a_program_runs_the_experiment() {
+    let machine = sample();
+    let built_in = machine.program.clone().unwrap();
+    let written = of_project("pairs.toml");
+    assert_eq!(built_in.bytes(), written.bytes());
+    assert_eq!(built_in.name, written.name);
+}
+
+#[test]
+fn golden_bytes_of_the_experiment() {
+    let bytes = of_project("pairs.toml").bytes();
+    // Version 2, six axes, 216 bytes of steps, cycles of 10 000 us.
+    assert_eq!(bytes[..8], [2, 6, 216, 0, 0x10, 0x27, 0, 0]);
+    // A move of all six, trapezoid.
+    assert_eq!(bytes[8..16], [1, 0, 0x3F, 0, 0, 0, 0, 0]);
+    // Axis 1: 40 000, 1200 rpm in set 1, 1500 and 800 rpm/s.
+    let axis_1 = [
+        0x40, 0x9C, 0, 0, 0xB0, 0x04, 0, 1, 0xDC, 0x05, 0, 0, 0x20, 0x03, 0, 0,
+    ];
+    assert_eq!(bytes[16..32], axis_1);
+    // Axis 2: -32 000, 900 rpm in set 2.
+    assert_eq!(bytes[32..40], [0x00, 0x83, 0xFF, 0xFF, 0x84, 0x03, 0, 2]);
+    // 50 cycles.
+    assert_eq!(bytes[112..120], [2, 0, 0, 0, 50, 0, 0, 0]);
+    assert_eq!(bytes[120..128], [1, 0, 0x3F, 0, 0, 0, 0, 0]);
+    assert_eq!(bytes.len(), 8 + 216 + 2);
+}
+
+/// A sine of 64 points is one shape with an amplitude for each axis.
+#[test]
+fn a_sine_is_short() {
+    let program = of_project("sine.toml");
+    let Action::Path(path) = &program.steps[0].action else {
+        panic!("{program:?}");
+    };
+    assert!(path.shared && path.points.len() <= 64);
+    assert_eq!(path.periods, 2);
+    let cycles: u32 = path.points.iter().map(|p| u32::from(p.cycles)).sum();
+    assert_eq!(cycles, 180);
+    // Half a period after the start it is twice the amplitude away.
+    let half = &path.points[path.points.len() / 2 - 1];
+    assert!((path.at(0, half).0 - 4000.0).abs() < 1e-3, "{:?}", path.at(0, half));
+    assert!((path.at(1, half).0 + 2000.0).abs() < 1e-3);
+    assert_eq!(path.at(0, path.points.last().unwrap()), (0.0, 0.0));
+    assert!(program.bytes().len() < 700, "{}", program.bytes().len());
+}
+
+/// The cubics between its points are nowhere farther from the sine than a tenth of
+/// an increment.
+#[test]
+fn error_of_sines() {
+    for (points, amplitude) in [(36, 100.0), (180, 2000.0), (500, 9000.0), (4, 2.0)] {
+        let program = compiled(&format!(
+            "[[step]]\n[step.sine]\naxes = [\"axis 1\"]\namplitude = {amplitude}\npoints = {points}"
+        ));
+        let Action::Path(path) = &program.steps[0].action else {
+            panic!("{program:?}");
+        };
+        let (mut at, mut speed, mut begin) = (0.0, 0.0, 0.0);
+        for point in &path.points {
+            let time = f64::from(point.cycles);
+            let (to, then) = path.at(0, point);
+            for step in 0..=point.cycles {
+                let s = f64::from(step) / time;
+                let (h1, h2) = ((1.0 + 2.0 * s) * (1.0 - s).powi(2), s * (1.0 - s).powi(2));
+                let (h3, h4) = (s * s * (3.0 - 2.0 * s), s * s * (s - 1.0));
+                let cubic = h1 * at + h2 * time * speed + h3 * to + h4 * time * then;
+                let angle = (begin + f64::from(step)) / f64::from(points) * std::f64::consts::TAU;
+                let sine = amplitude * (1.0 - angle.cos());
+                assert!((cubic - sine).abs() < 0.1, "{points}: {cubic} {sine}");
+            }
+            (at, speed, begin) = (to, then, begin + time);
+        }
+    }
+}
+
+#[test]
+fn steps_have_the_lines_that_they_come_from() {
+    let program = of_project("homing.toml");
+    let lines: Vec<Option<u32>> = (0..=10).map(|step| program.line_of(step)).collect();
+    let lines: Vec<u32> = lines.into_iter().map(|line| line.unwrap_or(0)).collect();
+    // Homing is three steps, a loop its steps and its end.
+    assert_eq!(lines, [0, 8, 8, 8, 12, 14, 18, 20, 24, 12, 0]);
+}
+
+#[test]
+fn the_course_knows_every_rest() {
+    let group = Group::of(&sample()).unwrap();
+    let course = of_project("pairs.toml").course(&group);
+    let targets: Vec<Vec<i32>> = course
+        .rests
+        .iter()
+        .map(|rest| rest.iter().map(|stop| stop.unwrap().target).collect())
+        .collect();
+    assert_eq!(
+        targets,
+        [vec![40_000, -32_000, 40_000, -32_000, 60_000, 60_000], vec![0; 6]]
+    );
+    let homing = of_project("homing.toml").course(&group);
+    assert_eq!(homing.rests.len(), 4);
+    assert!(homing.rests.iter().all(|rest| rest[2].is_none()));
+}
+
+#[test]
+fn a_description_names_its_program() {
+    let text = std::fs::read_to_string(workspace().join("network.toml")).unwrap();
+    let with = |program: &str| {
+        let text = format!("{text}\n[group]\nprogram = \"{program}\"\n");
+        let source = Source::new("network.toml", text.as_bytes());
+        read_for_firmware(&source, &mut |file| std::fs::read(workspace().join(file)))
+    };
+    let outcome = with("programs/sine.toml");
+    assert_eq!(outcome.machine.unwrap().program.unwrap().name, "sine");
+    assert!(outcome.files.contains(&"programs/sine.toml".to_string()));
+    let outcome = with("programs/nowhere.toml");
+    assert!(outcome.machine.is_none());
+    assert!(words(&outcome.problems).contains("the motion program cannot be read"));
+}
+
+/// Each with the words that a user reads.
+#[test]
+fn every_broken_program_has_its_message() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/programs");
+    let mut names: Vec<String> = std::fs::read_dir(&folder)
+        .unwrap()
+        .filter_map(|file| {
+            let name = file.unwrap().file_name().into_string().unwrap();
+            name.strip_suffix(".toml").map(String::from)
+        })
+        .collect();
+    names.sort();
+    assert!(names.len() >= 20, "{}", names.len());
+    let machine = sample();
+    let mut all = Vec::new();
+    for name in names {
+        let file = format!("{name}.toml");
+        let bytes = std::fs::read(folder.join(&file)).unwrap();
+        let outcome = program::read(&Source::new(&file, &bytes), &machine);
+        let problems = &outcome.problems;
+        let refused = problems.iter().any(|p| p.severity == Severity::Error);
+        assert_eq!(outcome.program.is_none(), refused, "{name}");
+        assert!(!problems.is_empty(), "{name}");
+        all.push(words(problems));
+    }
+    insta::assert_snapshot!("broken_programs", all.join("\n\n"));
+}
