@@ -42,7 +42,10 @@ fn the_programs_of_the_project_are_valid() {
         .map(|file| file.unwrap().file_name().into_string().unwrap())
         .collect();
     names.sort();
-    assert_eq!(names, ["homing.toml", "pairs.toml", "sine.toml", "six_axes.toml"]);
+    assert_eq!(
+        names,
+        ["homing.toml", "pairs.toml", "sine.toml", "six_axes.toml"]
+    );
     for name in names {
         let program = of_project(&name);
         assert_eq!(format::check(&program.bytes(), &GROUP), Ok(()), "{name}");
@@ -95,7 +98,11 @@ fn a_sine_is_short() {
     assert_eq!(cycles, 180);
     // Half a period after the start it is twice the amplitude away.
     let half = &path.points[path.points.len() / 2 - 1];
-    assert!((path.at(0, half).0 - 4000.0).abs() < 1e-3, "{:?}", path.at(0, half));
+    assert!(
+        (path.at(0, half).0 - 4000.0).abs() < 1e-3,
+        "{:?}",
+        path.at(0, half)
+    );
     assert!((path.at(1, half).0 + 2000.0).abs() < 1e-3);
     assert_eq!(path.at(0, path.points.last().unwrap()), (0.0, 0.0));
     assert!(program.bytes().len() < 700, "{}", program.bytes().len());
@@ -150,7 +157,10 @@ fn the_course_knows_every_rest() {
         .collect();
     assert_eq!(
         targets,
-        [vec![40_000, -32_000, 40_000, -32_000, 60_000, 60_000], vec![0; 6]]
+        [
+            vec![40_000, -32_000, 40_000, -32_000, 60_000, 60_000],
+            vec![0; 6]
+        ]
     );
     let homing = of_project("homing.toml").course(&group);
     assert_eq!(homing.rests.len(), 4);

@@ -58,6 +58,8 @@ fn the_generated_network_is_the_one_of_the_library() {
     assert_eq!(generated::AXES, SIX_EPOS4.nodes.len());
     assert_eq!(generated::MOTORS, [Motor::SAMPLE; generated::AXES]);
     assert_eq!(generated::TPDO_DEADLINE_US, 5_000);
+    let program = sample().program.unwrap();
+    assert_eq!(generated::PROGRAM[..], program.bytes());
     assert_eq!(generated::TPDO_MISSING_LIMIT, GROUP.missing_tpdo_max);
     // What comes after the deadline at worst still fits.
     const { assert!(generated::SHORTEST_CYCLE_US > generated::TPDO_DEADLINE_US as u32) };

@@ -62,6 +62,12 @@ fn tables() -> Vec<(&'static str, String, &'static str, &'static str)> {
             ".axis]",
         ),
         (
+            "group",
+            format!("{master}[group]\n{bad}"),
+            "/properties/group",
+            "[group]",
+        ),
+        (
             "start value",
             format!("{master}[bus]\n{device}[[device.x.start_values]]\n{bad}"),
             "/$defs/start_value",

@@ -95,7 +95,13 @@ impl<'a> Configurator<'a> {
         let boots = self.local.boot.next_deadline().filter(|_| !held);
         let mut next = self.now() + design::CONFIGURATOR_PERIOD;
         // 0 wraps: nothing is waited for.
-        let patience = self.local.director.patience().wrapping_sub(1).min(CYCLES_MAX) + 1;
+        let patience = self
+            .local
+            .director
+            .patience()
+            .wrapping_sub(1)
+            .min(CYCLES_MAX)
+            + 1;
         let motion = self.now() + Duration::from_micros(patience * CYCLE_US);
         next = motion.min(next);
         for deadline in [boots, self.local.own.device.next_deadline(), tested] {

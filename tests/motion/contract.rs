@@ -3,8 +3,8 @@
 use canmaster::cia402::{Command, ControlWord, State};
 use canmaster::motion::experiment::{Motor, group};
 use canmaster::motion::mode::Mode;
-use canmaster::motion::{Fault, FaultCause, GroupEvent, GroupState, PlanError, Refusal};
 use canmaster::motion::{Director, Group, GroupConfig, Inputs, Order};
+use canmaster::motion::{Fault, FaultCause, GroupEvent, GroupState, PlanError, Refusal};
 use canmaster::time::Duration;
 
 use crate::rig::{ALL, AXES, READY, Rig, far};
@@ -67,7 +67,11 @@ fn a_target_outside_the_limits_is_refused() {
             Some(part)
         });
         let refused = rig.director.go(&rig.group, &parts, false, 0);
-        let value = if allowed < 0 { allowed - 1 } else { allowed + 1 };
+        let value = if allowed < 0 {
+            allowed - 1
+        } else {
+            allowed + 1
+        };
         let expected = PlanError {
             fault,
             axis: AXIS as u8,

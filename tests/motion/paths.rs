@@ -10,7 +10,11 @@ fn planned(legs: &[Option<Leg>]) -> (u32, Vec<Knots>) {
     let mut legs: Vec<Leg> = legs.iter().cloned().map(or_none).collect();
     plan::plan(&mut legs).unwrap();
     let cycles = |leg: &Leg| leg.knots.iter().map(|knot| knot.cycles).sum();
-    let longest = legs.iter().filter(|leg| leg.set.is_some()).map(cycles).max();
+    let longest = legs
+        .iter()
+        .filter(|leg| leg.set.is_some())
+        .map(cycles)
+        .max();
     let knots = legs.into_iter().map(|leg| leg.knots);
     (longest.unwrap_or(0), knots.collect())
 }
@@ -103,7 +107,11 @@ fn nothing_to_do_takes_two_cycles() {
     let leg = leg(0, 1.0, 1.0, 1.0);
     let (cycles, knots) = planned(&[Some(leg.clone()), None]);
     assert_eq!(cycles, 2);
-    assert!(points(leg.from, &knots[0]).iter().all(|point| *point == (0.0, 0.0, 0.0)));
+    assert!(
+        points(leg.from, &knots[0])
+            .iter()
+            .all(|point| *point == (0.0, 0.0, 0.0))
+    );
     assert!(knots[1].is_empty());
 }
 

@@ -44,7 +44,10 @@ fn watched(bytes: Vec<u8>, cycles: u32) -> Result<[i32; AXES], TestCaseError> {
         known += 1;
         let state = rig.group.state();
         prop_assert!(
-            matches!(state, GroupState::Standby | GroupState::Moving | GroupState::Stopping),
+            matches!(
+                state,
+                GroupState::Standby | GroupState::Moving | GroupState::Stopping
+            ),
             "{}",
             rig.last()
         );
@@ -92,7 +95,12 @@ fn paths() -> impl Strategy<Value = Vec<u8>> {
     let points = prop::collection::vec(point, 1..5);
     (1u16..64, 1u32..3, points, -4000i32..4000).prop_map(|(axes, periods, points, amplitude)| {
         let flags = format::RELATIVE | format::SHARED;
-        let mut bytes = head(format::PATH, flags, axes, points.len() as u32 | periods << 16);
+        let mut bytes = head(
+            format::PATH,
+            flags,
+            axes,
+            points.len() as u32 | periods << 16,
+        );
         for _ in 0..axes.count_ones() {
             bytes.extend((amplitude << 10).to_le_bytes());
             bytes.extend([0; 4]);

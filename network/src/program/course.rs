@@ -104,7 +104,11 @@ impl Walk<'_> {
             Action::Move(a_move) => {
                 let cycles = timing::cycles(self.group, a_move, &self.at);
                 for part in &a_move.parts {
-                    let from = if a_move.relative { self.at[part.axis] } else { 0 };
+                    let from = if a_move.relative {
+                        self.at[part.axis]
+                    } else {
+                        0
+                    };
                     self.go(part.axis, from + i64::from(part.target), part.set);
                 }
                 self.course.cycles += u64::from(cycles) + SETTLING_CYCLES;
@@ -127,7 +131,10 @@ impl Walk<'_> {
                 self.course.cycles += cycles.sum::<u64>() * u64::from(path.periods);
                 self.course.cycles += SETTLING_CYCLES;
                 for (member, of) in path.members.iter().enumerate() {
-                    let end = path.points.last().map_or(0.0, |last| path.at(member, last).0);
+                    let end = path
+                        .points
+                        .last()
+                        .map_or(0.0, |last| path.at(member, last).0);
                     let to = self.at[of.axis] + end.round() as i64;
                     self.go(of.axis, to, 0);
                     // It moved, wherever it ends.

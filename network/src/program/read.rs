@@ -71,7 +71,10 @@ pub(super) fn program(source: &Source, group: &Group, problems: &mut Problems) -
     }
     let steps = reader.steps(&file.step, 0);
     let program = Program {
-        name: file.name.clone().unwrap_or_else(|| source.name().to_string()),
+        name: file
+            .name
+            .clone()
+            .unwrap_or_else(|| source.name().to_string()),
         axes: group.axes.len(),
         cycle_us: group.cycle_us,
         steps,
@@ -91,7 +94,9 @@ pub(super) fn program(source: &Source, group: &Group, problems: &mut Problems) -
 
 impl Reader<'_> {
     fn error(&mut self, place: &Place, value: impl ToString, rule: String, help: &str) {
-        self.context.problems.error(place, value.to_string(), rule, help);
+        self.context
+            .problems
+            .error(place, value.to_string(), rule, help);
     }
 
     fn steps(&mut self, steps: &[Spanned<description::Step>], depth: usize) -> Vec<Step> {
@@ -264,12 +269,7 @@ impl Reader<'_> {
     }
 
     /// A number for each member.
-    fn values(
-        &mut self,
-        values: &Spanned<Values>,
-        key: &str,
-        members: usize,
-    ) -> Option<Vec<f64>> {
+    fn values(&mut self, values: &Spanned<Values>, key: &str, members: usize) -> Option<Vec<f64>> {
         let place = self.context.at(values);
         if let Values::Each(all) = values.get_ref()
             && all.len() != members
@@ -279,9 +279,16 @@ impl Reader<'_> {
             self.error(&place, values.get_ref(), rule, help);
             return None;
         }
-        let all: Vec<f64> = (0..members).map(|member| values.get_ref().of(member)).collect();
+        let all: Vec<f64> = (0..members)
+            .map(|member| values.get_ref().of(member))
+            .collect();
         if let Some(value) = all.iter().find(|value| !value.is_finite()) {
-            self.error(&place, value, format!("{key} is no number"), "write a number");
+            self.error(
+                &place,
+                value,
+                format!("{key} is no number"),
+                "write a number",
+            );
             return None;
         }
         Some(all)
@@ -311,7 +318,9 @@ impl Reader<'_> {
         };
         for (_, mode) in MODES {
             let back = members.iter().copied();
-            let back: Vec<usize> = back.filter(|axis| before(self, *axis) == Some(mode)).collect();
+            let back: Vec<usize> = back
+                .filter(|axis| before(self, *axis) == Some(mode))
+                .collect();
             if !back.is_empty() {
                 let axes = set(&back);
                 actions.push(Action::Mode { axes, mode });
@@ -353,7 +362,9 @@ impl Reader<'_> {
         for axis in members {
             let axis = self.group.axes.get(*axis)?;
             if axis.modes & mode_bit(mode) == 0 {
-                let has = MODES.iter().filter(|(_, code)| axis.modes & mode_bit(*code) != 0);
+                let has = MODES
+                    .iter()
+                    .filter(|(_, code)| axis.modes & mode_bit(*code) != 0);
                 let has: Vec<&str> = has.map(|(name, _)| *name).collect();
                 let rule = format!(
                     "\"{}\" cannot be led in this mode: its drive lacks it (6502h), or no RPDO \

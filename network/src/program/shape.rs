@@ -81,7 +81,10 @@ pub(super) fn sine(members: &[Begin], cycles: u32, periods: u16) -> Path {
             (0, 0)
         } else {
             let position = height * (1.0 - angle.cos());
-            (position.round() as i32, (height * step * angle.sin()).round() as i32)
+            (
+                position.round() as i32,
+                (height * step * angle.sin()).round() as i32,
+            )
         };
         Point {
             cycles: (at(piece) - at(piece - 1)) as u16,
@@ -147,7 +150,10 @@ pub(super) fn own(axes: &[usize], begins: &[i32], knots: &[Knot]) -> Option<Path
     }
     let points = knots.iter().map(|(cycles, all)| {
         let shapes = all.iter().zip(&fine).map(|((position, velocity), fine)| {
-            ((position * fine).round() as i32, (velocity * fine).round() as i32)
+            (
+                (position * fine).round() as i32,
+                (velocity * fine).round() as i32,
+            )
         });
         Some(Point {
             cycles: u16::try_from(*cycles).ok()?,
@@ -169,7 +175,8 @@ pub(super) fn own(axes: &[usize], begins: &[i32], knots: &[Knot]) -> Option<Path
 pub(super) fn table(rows: &[Vec<i64>], cycles: u32) -> Vec<Knot> {
     let at = |row: usize, member: usize| {
         let row = row.checked_sub(1).and_then(|row| rows.get(row));
-        row.and_then(|row| row.get(member)).map_or(0.0, |x| *x as f64)
+        row.and_then(|row| row.get(member))
+            .map_or(0.0, |x| *x as f64)
     };
     let knot = |row: usize, values: &Vec<i64>| {
         let slope = |member: usize| {
@@ -181,7 +188,10 @@ pub(super) fn table(rows: &[Vec<i64>], cycles: u32) -> Vec<Knot> {
         let members = 0..values.len();
         (cycles, members.map(|m| (at(row, m), slope(m))).collect())
     };
-    rows.iter().enumerate().map(|(n, row)| knot(n + 1, row)).collect()
+    rows.iter()
+        .enumerate()
+        .map(|(n, row)| knot(n + 1, row))
+        .collect()
 }
 
 /// Way-points from where the axes are: straight lines at constant speed, the slowest
@@ -231,7 +241,11 @@ pub(super) fn way_points(rows: &[Vec<i64>], limits: &[(f64, f64)]) -> Vec<Knot> 
     let mut knots = Vec::new();
     for corner in 0..=legs {
         let velocity = |leg: usize, axis: usize| {
-            if leg < legs { way(leg, axis) / times[leg] } else { 0.0 }
+            if leg < legs {
+                way(leg, axis) / times[leg]
+            } else {
+                0.0
+            }
         };
         let half = blends[corner] / 2.0;
         let after = |axis: usize| {
@@ -260,7 +274,9 @@ fn split(knots: Vec<Knot>) -> Vec<Knot> {
     for (mut cycles, all) in knots {
         while cycles > CYCLES_MAX {
             let left = f64::from(cycles - CYCLES_MAX);
-            let at = all.iter().map(|(at, velocity)| (at - velocity * left, *velocity));
+            let at = all
+                .iter()
+                .map(|(at, velocity)| (at - velocity * left, *velocity));
             out.push((CYCLES_MAX, at.collect()));
             cycles -= CYCLES_MAX;
         }

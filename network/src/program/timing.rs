@@ -46,7 +46,9 @@ fn jerk(group: &Group, a_move: &Move, set: u8) -> u32 {
         return 0;
     }
     let parts = a_move.parts.iter().filter(|part| part.set == set);
-    let steepest = parts.map(|part| part.acceleration.max(part.deceleration)).max();
+    let steepest = parts
+        .map(|part| part.acceleration.max(part.deceleration))
+        .max();
     let seconds = f64::from(steepest.unwrap_or(0)) / f64::from(a_move.jerk);
     group.cycles(seconds * 1000.0).max(1)
 }

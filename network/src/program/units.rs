@@ -109,7 +109,10 @@ mod tests {
             assert!((there * 27 - user * 35).abs() <= 13, "{user}");
             assert!(lost.abs() <= 0.5);
         }
-        assert_eq!(unit.increments(&axis, 771_428_571.0).unwrap().0, 999_999_999);
+        assert_eq!(
+            unit.increments(&axis, 771_428_571.0).unwrap().0,
+            999_999_999
+        );
         assert_eq!(Unit::Turns.increments(&axis, 1.5).unwrap(), (7000, 0.0));
         assert_eq!(Unit::Degrees.increments(&axis, -540.0).unwrap().0, -7000);
         assert_eq!(Unit::Increments.increments(&axis, 2.5).unwrap().0, 3);

@@ -195,9 +195,18 @@ impl<'a> Step<'a> {
         }
         let (rpm, slope) = (limits.scale.rpm(fastest), limits.scale.rpm_per_s(steepest));
         let most = limits.acceleration_max;
-        within(axis, Fault::Velocity, (rpm as u32).max(1), limits.velocity_max)?;
+        within(
+            axis,
+            Fault::Velocity,
+            (rpm as u32).max(1),
+            limits.velocity_max,
+        )?;
         within(axis, Fault::Acceleration, (slope as u32).max(1), most)?;
-        let way = if self.periods() > 1 { before.position } else { 0 };
+        let way = if self.periods() > 1 {
+            before.position
+        } else {
+            0
+        };
         if before.velocity | way != 0 {
             return Err(PlanError {
                 axis,

@@ -60,14 +60,21 @@ impl Reader<'_> {
         self.follows_paths(&members, &place)?;
         let begins = self.begins(&members, &sine.amplitude)?;
         let most = i64::from(u16::MAX);
-        let points: u32 = self.context.number(&sine.points, "points", POINTS_MIN..=most)?;
+        let points: u32 = self
+            .context
+            .number(&sine.points, "points", POINTS_MIN..=most)?;
         let cycles: u32 = match &sine.cycles {
             Some(cycles) => self.context.number(cycles, "cycles", 1..=most)?,
             None => 1,
         };
         let Some(period) = points.checked_mul(cycles).filter(|all| *all < 1 << 22) else {
             let rule = "a period is shorter than 4,194,304 cycles".to_string();
-            self.error(&place, points, rule, "use fewer points, or fewer cycles of a point");
+            self.error(
+                &place,
+                points,
+                rule,
+                "use fewer points, or fewer cycles of a point",
+            );
             return None;
         };
         let periods = self.periods(sine.periods.as_ref())?;
@@ -125,7 +132,12 @@ impl Reader<'_> {
         if all.is_empty() || all.len() > ROWS_MAX {
             let place = self.context.at(points);
             let rule = format!("there are 1 ..= {ROWS_MAX} points");
-            self.error(&place, all.len(), rule, "write some, or divide them between programs");
+            self.error(
+                &place,
+                all.len(),
+                rule,
+                "write some, or divide them between programs",
+            );
             return None;
         }
         let mut rows = Vec::new();
@@ -148,7 +160,12 @@ impl Reader<'_> {
         let path = shape::own(members, begins, knots);
         if path.is_none() {
             let rule = format!("a point lies at most {AMPLITUDE_MAX} increments from the begin");
-            self.error(place, "points", rule, "divide the way between several steps");
+            self.error(
+                place,
+                "points",
+                rule,
+                "divide the way between several steps",
+            );
         }
         path
     }

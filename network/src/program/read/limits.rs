@@ -108,14 +108,21 @@ impl Reader<'_> {
         if value.abs() <= TORQUE_MAX as f64 {
             return Some(value as i32);
         }
-        let rule = format!("the torque of \"{name}\" must be -{TORQUE_MAX} ..= {TORQUE_MAX} per mille");
+        let rule =
+            format!("the torque of \"{name}\" must be -{TORQUE_MAX} ..= {TORQUE_MAX} per mille");
         self.error(place, value, rule, "write less");
         None
     }
 
     /// Every piece of a path against the limits of its axes, as the firmware checks
     /// it: a cubic lies within the hull of its control points.
-    pub(super) fn keeps(&mut self, path: &Path, what: &str, help: &str, place: &Place) -> Option<()> {
+    pub(super) fn keeps(
+        &mut self,
+        path: &Path,
+        what: &str,
+        help: &str,
+        place: &Place,
+    ) -> Option<()> {
         for (number, member) in path.members.iter().enumerate() {
             let axis = self.group.axes.get(member.axis)?;
             let cycle = self.group.cycle_us;

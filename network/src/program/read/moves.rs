@@ -30,7 +30,12 @@ impl Reader<'_> {
         };
         if moves.is_empty() {
             let rule = "nothing is moved".to_string();
-            self.error(place, "move", rule, "add [[step.move]] with axes and to or by");
+            self.error(
+                place,
+                "move",
+                rule,
+                "add [[step.move]] with axes and to or by",
+            );
             return None;
         }
         let mut complete = true;
@@ -62,7 +67,12 @@ impl Reader<'_> {
         let of = |own, of_file, key, reader: &mut Self| {
             reader.ramps(own, of_file, key, &members, &place)
         };
-        let velocity = of(one.velocity.as_ref(), file.velocity.as_ref(), "velocity", self);
+        let velocity = of(
+            one.velocity.as_ref(),
+            file.velocity.as_ref(),
+            "velocity",
+            self,
+        );
         let up = of(
             one.acceleration.as_ref(),
             file.acceleration.as_ref(),
@@ -102,7 +112,9 @@ impl Reader<'_> {
     }
 
     fn target(&mut self, axis: usize, value: f64, relative: bool, place: &Place) -> Option<i32> {
-        let target = *self.increments(&[value], &[axis], place, relative)?.first()?;
+        let target = *self
+            .increments(&[value], &[axis], place, relative)?
+            .first()?;
         let known = self.known.get_mut(axis)?;
         let at = match relative {
             true => known.at.map(|at| at.saturating_add(target)),
