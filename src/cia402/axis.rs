@@ -107,7 +107,9 @@ enum Reset {
 pub struct Axis {
     goal: Goal,
     since: Instant,
-    status: Option<StatusWord>,
+    /// As last heard, if anything was heard since the goal was set.
+    state: State,
+    heard: bool,
     word: ControlWord,
     reset: Reset,
     /// When bit 7 was set.
@@ -127,7 +129,8 @@ impl Axis {
         Axis {
             goal: Goal::Disabled,
             since: Instant::ZERO,
-            status: None,
+            state: State::NotReadyToSwitchOn,
+            heard: false,
             word: ControlWord::new(Command::DisableVoltage),
             reset: Reset::Idle,
             set_at: Instant::ZERO,
@@ -138,7 +141,7 @@ impl Axis {
     pub const fn set_goal(&mut self, goal: Goal, now: Instant) {
         self.goal = goal;
         self.since = now;
-        self.status = None;
+        self.heard = false;
     }
 
     /// The goal as set.
@@ -148,26 +151,29 @@ impl Axis {
 
     /// The last state heard since the goal was set.
     pub const fn state(&self) -> Option<State> {
-        match self.status {
-            Some(status) => Some(status.state()),
-            None => None,
-        }
+        if self.heard { Some(self.state) } else { None }
     }
 
     /// Whether a fresh statusword has shown that the goal is reached.
     pub fn reached(&self) -> bool {
-        self.state().is_some_and(|s| self.goal.reached_by(s))
+        self.heard && self.goal.reached_by(self.state)
     }
 
     /// One cycle: takes in the statusword, if a fresh one came, and returns the
     /// controlword to send. Each returned word must reach the drive before the
     /// next call, or the reset's edge is lost.
     pub fn step(&mut self, now: Instant, fresh: Option<StatusWord>) -> ControlWord {
-        let Some(status) = fresh else {
-            return self.word;
-        };
-        self.status = fresh;
-        match self.goal.command_from(status.state()) {
+        match fresh {
+            None => self.word,
+            Some(status) => self.follow(now, status.state()),
+        }
+    }
+
+    /// The same for a state that a fresh statusword has just shown.
+    pub(crate) fn follow(&mut self, now: Instant, state: State) -> ControlWord {
+        self.state = state;
+        self.heard = true;
+        match self.goal.command_from(state) {
             None => {}
             Some(Command::FaultReset) => self.reset_fault(now),
             Some(command) => {
@@ -175,6 +181,11 @@ impl Axis {
                 self.reset = Reset::Idle;
             }
         }
+        self.word
+    }
+
+    /// The controlword as last made.
+    pub(crate) const fn word(&self) -> ControlWord {
         self.word
     }
 

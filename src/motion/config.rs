@@ -52,11 +52,10 @@ impl AxisConfig {
 
 /// A group of `N` axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
 pub struct GroupConfig<const N: usize> {
     /// Time between two SYNCs, which is the time between two steps.
     pub cycle: Duration,
-    /// The axes, in the order of feedback and commands.
-    pub axes: [AxisConfig; N],
     /// The position loops.
     pub tuning: Tuning,
     /// Time for all axes to reach the next state on the way to operation
@@ -83,6 +82,8 @@ pub struct GroupConfig<const N: usize> {
     /// Smallest 6083h and 6084h, rpm/s: room for the position loop when the
     /// reference rests.
     pub ramp_min: u32,
+    /// The axes, in the order of feedback and commands.
+    pub axes: [AxisConfig; N],
 }
 
 impl<const N: usize> GroupConfig<N> {

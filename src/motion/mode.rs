@@ -80,11 +80,6 @@ impl Mode {
 
     /// Those of which the path is one of positions, as bits of 6502h.
     pub(super) const WITH_POSITION: u32 = 1 << 2 | 1 << 7 | 1 << 8;
-
-    /// Whether the path is one of positions.
-    pub(super) const fn has_position(self) -> bool {
-        self.is_velocity() || matches!(self, Mode::CyclicPosition)
-    }
 }
 
 in_words!(Mode {

@@ -78,25 +78,29 @@ impl Sample {
     }
 }
 
-/// The path of one axis, evaluated from SYNC to SYNC.
+/// The path of one axis, evaluated from SYNC to SYNC. Small fields stand first, where
+/// they are reached by short instructions.
 #[derive(Clone, Copy, Debug)]
+#[repr(C)]
 pub struct Path {
-    position: i64,
-    /// Forward differences: of the position in 2^-32, and its second and third
-    /// in 2^-44. At rest the first is the velocity at the last knot.
-    first: i64,
-    second: i64,
-    third: i64,
-    acceleration: f32,
-    jerk: f32,
-    /// Where the piece ends, and in how many cycles; 0: at rest, or run dry.
-    to: Knot,
-    /// What follows, from `begin` on.
-    knots: [Knot; KNOTS],
+    /// What follows is in `knots` from there on.
     begin: u8,
     len: u8,
     /// So many knots at the back belong to the path that replaces this one.
     next: u8,
+    /// What is 0 at constant velocity does not stand together: that would be cleared
+    /// by a slow loop.
+    position: i64,
+    /// Forward differences: of the position in 2^-32, and its second and third
+    /// in 2^-44. At rest the first is the velocity at the last knot.
+    second: i64,
+    first: i64,
+    third: i64,
+    /// Where the piece ends, and in how many cycles; 0: at rest, or run dry.
+    to: Knot,
+    acceleration: f32,
+    jerk: f32,
+    knots: [Knot; KNOTS],
 }
 
 impl Path {
@@ -134,18 +138,18 @@ impl Path {
     pub fn restart(&mut self, at: &Point) {
         self.len = 0;
         self.next = 0;
-        self.go_to(at.position, at.velocity);
+        self.stand_at(at.position, at.velocity);
+        self.straight_on();
     }
 
-    #[inline(never)]
-    fn go_to(&mut self, position: i64, velocity: i64) {
+    /// As at a knot.
+    fn stand_at(&mut self, position: i64, velocity: i64) {
         self.position = position;
         self.to = Knot {
             cycles: 0,
             position,
             velocity,
         };
-        self.straight_on();
     }
 
     /// At constant velocity from the last knot on.
@@ -178,7 +182,8 @@ impl Path {
     }
 
     fn place(&self, n: u8) -> usize {
-        usize::from(self.begin + n) % KNOTS
+        let place = usize::from(self.begin + n);
+        if place < KNOTS { place } else { place - KNOTS }
     }
 
     fn knot(&self, n: u8) -> Option<&Knot> {
@@ -228,7 +233,8 @@ impl Path {
         let Point {
             position, velocity, ..
         } = self.point();
-        self.go_to(position, velocity);
+        // The first piece is begun by the next cycle.
+        self.stand_at(position, velocity);
     }
 
     /// Where it stands, in 2^-32 increments.
@@ -238,9 +244,14 @@ impl Path {
 
     /// Where it stands and how fast it goes on.
     pub fn point(&self) -> Point {
+        let bent = self.bent();
+        let mut velocity = self.first;
+        if bent != 0.0 {
+            velocity -= fixed::fixed(bent);
+        }
         Point {
             position: self.position,
-            velocity: self.first - fixed::fixed(self.bent()),
+            velocity,
             acceleration: self.acceleration,
         }
     }

@@ -151,8 +151,9 @@ impl PositionControl {
         let advanced = ahead + (tuning.lag + self.learned) * (window.beyond - ahead);
         let wanted = scale.rpm(advanced) + correction + self.carry;
         let limit = limit as f32;
-        let command = round(within(wanted, -limit, limit));
-        self.carry = within(wanted - command as f32, -1.0, 1.0);
+        let wanted = within(wanted, -limit, limit);
+        let command = round(wanted);
+        self.carry = wanted - command as f32;
         command
     }
 }

@@ -7,7 +7,7 @@ use crate::motion::fixed;
 use crate::motion::mode::Mode;
 use crate::motion::path::{Knot, Path, Point, Sample};
 use crate::motion::position_control::{PositionControl, Tuning, Window};
-use crate::motion::{AxisConfig, AxisFeedback};
+use crate::motion::{AxisConfig, AxisFeedback, GroupConfig};
 
 /// SYNCs that the path is ahead of the last sampled position: the next command
 /// acts at the next SYNC and lasts to the one after it; the position loop looks
@@ -18,11 +18,51 @@ const NEXT: u32 = 1;
 const END: u32 = 2;
 const RING: usize = 4;
 
+/// A set of axes: bit n for axis n.
+pub(super) type Axes = u32;
+
+/// What a step sees of an axis, as bits.
+pub(super) type Seen = u16;
+
+/// Its TPDOs have come.
+pub(super) const FRESH: Seen = 1 << 0;
+/// And show no more speed than at rest.
+pub(super) const SLOW: Seen = 1 << 1;
+/// And that drive, reference and position are as they should be in a motion that
+/// the drive does not lead.
+pub(super) const SOUND: Seen = 1 << 2;
+/// And that its drive reports a fault.
+pub(super) const FAILED: Seen = 1 << 3;
+/// Its TPDOs have been missing for too long.
+pub(super) const SILENT: Seen = 1 << 4;
+/// Its path is over, and the SYNC just passed lies behind the end.
+pub(super) const ENDED: Seen = 1 << 5;
+/// And it has come to rest.
+pub(super) const AT_REST: Seen = 1 << 6;
+/// And that on its target.
+pub(super) const PLACED: Seen = 1 << 7;
+/// A statusword has come since the group began to enable ...
+pub(super) const HEARD: Seen = 1 << 8;
+/// ... and the last showed operation enabled.
+pub(super) const ENABLED: Seen = 1 << 9;
+/// Its drive leads the motion, by the mode that it is in.
+pub(super) const BY_DRIVE: Seen = 1 << 10;
+/// Its reference is a position.
+pub(super) const BY_POSITION: Seen = 1 << 11;
+/// It has reached the stage of enabling.
+pub(super) const REACHED: Seen = 1 << 12;
+/// What lasts longer than a step.
+const LASTING: Seen = HEARD | ENABLED | BY_DRIVE | BY_POSITION | REACHED;
+/// What is over when the group enters a state.
+pub(super) const PASSING: Seen = ENDED | AT_REST | PLACED;
+
 /// How a state of the group leads an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Lead {
     /// It stays where it is.
     Rest,
+    /// It is not held there yet.
+    Actual,
     /// It follows its reference.
     Follow,
     /// It is to end the motion that its drive leads, or follows its reference.
@@ -31,41 +71,46 @@ pub(super) enum Lead {
     Fault,
 }
 
-/// All of it is 0 before the group is configured.
+/// All of it is 0 before the group is configured. Small fields stand first, where
+/// they are reached by short instructions.
+#[repr(C)]
 pub(super) struct Axis {
-    /// What its drive reported in this cycle.
-    pub(super) feedback: AxisFeedback,
-    pub(super) machine: cia402::Axis,
+    pub(super) seen: Seen,
+    /// Consecutive cycles at standstill since the path was over, and of those in
+    /// position.
+    rested: u8,
+    placed: u8,
+    /// Consecutive cycles without TPDO.
+    pub(super) missing: u8,
     /// As confirmed in 6061h, if it is another one than configured.
     pub(super) changed: Option<Mode>,
     /// The mode to change to.
     pub(super) wanted: Option<Mode>,
-    pub(super) path: Path,
-    /// The reference at the SYNC just passed, and at the next ones: a ring, in
-    /// which that of the step `n` is at `n` modulo its length.
-    samples: [Sample; RING],
+    /// Last fresh statusword, and its state.
+    pub(super) state: State,
+    status: Option<StatusWord>,
     /// The step that it counts from.
     count: u32,
+    /// Cycles since the path was over.
+    over: u32,
     /// Reference minus position at the SYNC just passed, increments.
     error: f32,
     /// Position that targets count from.
     pub(super) home: i32,
-    pub(super) led: DriveLed,
-    control: PositionControl,
-    /// Last fresh statusword since the group began to enable.
-    pub(super) status: Option<StatusWord>,
-    reported: Option<StatusWord>,
-    /// Consecutive cycles without TPDO.
-    pub(super) missing: u8,
-    /// Consecutive cycles in position, or at standstill.
-    pub(super) settled: u8,
-    /// Cycles since the path was over.
-    pub(super) over: u32,
     /// What was commanded last.
     target: i32,
     /// 6083h and 6084h, rpm/s.
     up: u32,
     down: u32,
+    control: PositionControl,
+    /// What its drive reported in this cycle.
+    pub(super) feedback: AxisFeedback,
+    pub(super) led: DriveLed,
+    /// The reference at the SYNC just passed, and at the next ones: a ring, in
+    /// which that of the step `n` is at `n` modulo its length.
+    samples: [Sample; RING],
+    pub(super) path: Path,
+    pub(super) machine: cia402::Axis,
 }
 
 impl Axis {
@@ -78,6 +123,7 @@ impl Axis {
             fresh: false,
         },
         machine: cia402::Axis::new(),
+        seen: 0,
         changed: None,
         wanted: None,
         path: Path::ZERO,
@@ -88,19 +134,20 @@ impl Axis {
         led: DriveLed::new(),
         control: PositionControl::new(),
         status: None,
-        reported: None,
+        state: State::NotReadyToSwitchOn,
         missing: 0,
-        settled: 0,
+        rested: 0,
+        placed: 0,
         over: 0,
         target: 0,
         up: 0,
         down: 0,
     };
 
-    /// Forgets what was heard, before enabling.
+    /// Forgets what was asked of the drive, before enabling.
     pub(super) fn restart(&mut self) {
-        self.status = None;
         self.missing = 0;
+        self.seen &= !(HEARD | ENABLED);
         self.led = DriveLed::new();
     }
 
@@ -108,64 +155,105 @@ impl Axis {
         self.changed.unwrap_or(config.mode)
     }
 
+    /// Takes over its mode.
+    pub(super) fn take_mode(&mut self, config: &AxisConfig) {
+        let mode = self.mode(config);
+        self.seen &= !(BY_DRIVE | BY_POSITION);
+        if mode.is_led_by_drive() {
+            self.seen |= BY_DRIVE;
+        } else if mode != Mode::CyclicTorque {
+            self.seen |= BY_POSITION;
+        }
+    }
+
     /// Takes in this cycle's feedback and goes one cycle on; returns the state of
     /// the drive if it is another one than last reported.
     #[inline(never)]
-    pub(super) fn hear(&mut self, feedback: &AxisFeedback, count: u32, cut: bool) -> Option<State> {
+    pub(super) fn hear<const N: usize>(
+        &mut self,
+        feedback: &AxisFeedback,
+        count: u32,
+        cut: bool,
+        limits: &AxisConfig,
+        config: &GroupConfig<N>,
+    ) -> Option<State> {
         self.count = count;
         if cut {
             self.path.cut();
-            self.settled = 0;
             self.over = 0;
         }
         // At rest all samples are the same.
         let over = self.path.is_over();
-        if !(over && self.ended()) {
+        if !over || self.over < AHEAD {
             self.go_on(AHEAD);
         }
         self.over = if over { self.over.saturating_add(1) } else { 0 };
+        let mut seen = self.seen & LASTING;
+        if self.over >= AHEAD {
+            seen |= ENDED;
+        } else {
+            (self.rested, self.placed) = (0, 0);
+        }
         self.feedback = *feedback;
-        if !feedback.fresh {
+        let mut news = None;
+        if feedback.fresh {
+            seen = seen & !ENABLED | FRESH | HEARD;
+            self.missing = 0;
+            let status = StatusWord(feedback.statusword);
+            let at = fixed::whole(feedback.position);
+            self.error = fixed::float(self.sample(0).position.wrapping_sub(at));
+            let error = self.error().unsigned_abs();
+            if status.is_fault() {
+                seen |= FAILED;
+            }
+            if status.is_enabled() {
+                seen |= ENABLED;
+                let near = error <= limits.following_error_max && seen & BY_DRIVE == 0;
+                if near && !status.mode_bit_13() && !self.path.is_dry() {
+                    seen |= SOUND;
+                }
+            }
+            let slow = feedback.velocity.unsigned_abs() <= config.standstill_rpm;
+            if slow {
+                seen |= SLOW;
+            }
+            if seen & ENDED != 0 {
+                count_if(&mut self.rested, slow);
+                count_if(&mut self.placed, slow && error <= limits.in_position);
+            }
+            let before = self.status.replace(status);
+            if !before.is_some_and(|last| last.shows_as(status)) {
+                let last = core::mem::replace(&mut self.state, status.state());
+                news = (before.is_none() || last != self.state).then_some(self.state);
+            }
+        } else {
             self.missing = self.missing.saturating_add(1);
-            return None;
+            if self.missing >= config.missing_tpdo_max {
+                seen |= SILENT;
+            }
         }
-        self.missing = 0;
-        let at = fixed::whole(feedback.position);
-        self.error = fixed::float(self.sample(0).position.wrapping_sub(at));
-        let status = StatusWord(feedback.statusword);
-        self.status = Some(status);
-        if self.reported.is_some_and(|last| last.shows_as(status)) {
-            return None;
+        if self.rested >= config.settle_cycles {
+            seen |= AT_REST;
         }
-        let before = self.reported.replace(status).map(StatusWord::state);
-        let state = status.state();
-        (before != Some(state)).then_some(state)
+        if self.placed >= config.settle_cycles {
+            seen |= PLACED;
+        }
+        self.seen = seen;
+        news
     }
 
     /// The next point of the path, as that of so many cycles ahead.
     fn go_on(&mut self, ahead: u32) {
         self.path.go_on();
         let sample = self.path.sample();
-        let place = self.count.wrapping_add(ahead) as usize % RING;
-        if let Some(place) = self.samples.get_mut(place) {
+        if let Some(place) = self.samples.get_mut(place(self.count, ahead)) {
             *place = sample;
         }
     }
 
     fn sample(&self, ahead: u32) -> &Sample {
-        let place = self.count.wrapping_add(ahead) as usize % RING;
         const REST: &Sample = &Sample::at_rest(0);
-        self.samples.get(place).unwrap_or(REST)
-    }
-
-    /// The state last heard since enabling began.
-    pub(super) fn state(&self) -> Option<State> {
-        self.status.map(StatusWord::state)
-    }
-
-    /// Whether that was operation enabled.
-    pub(super) fn is_enabled(&self) -> bool {
-        self.status.is_some_and(StatusWord::is_enabled)
+        self.samples.get(place(self.count, ahead)).unwrap_or(REST)
     }
 
     pub(super) fn fresh_status(&self) -> Option<StatusWord> {
@@ -195,7 +283,7 @@ impl Axis {
         };
         self.samples = [Sample::at_rest(position); RING];
         self.path.restart(&Point::at_rest(position));
-        self.settled = 0;
+        self.over = 0;
     }
 
     /// The drive's ramps for what follows, rpm/s.
@@ -219,7 +307,6 @@ impl Axis {
     /// on. The slope of it in rpm/s.
     #[inline(never)]
     pub(super) fn stop(&mut self, cycles: u32, speed: f32, config: &AxisConfig) -> f32 {
-        self.settled = 0;
         self.over = 0;
         let from = *self.sample(NEXT);
         let mut at = Point {
@@ -246,30 +333,9 @@ impl Axis {
         slope
     }
 
-    /// Whether the path is over and the SYNC just passed lies behind its end.
-    pub(super) fn ended(&self) -> bool {
-        self.over >= AHEAD
-    }
-
     /// How long it has waited to come to rest since its path ended, in cycles.
     pub(super) fn waited(&self) -> u32 {
         self.over.saturating_sub(AHEAD)
-    }
-
-    /// Counts cycles at rest, not farther than `near` from the reference, and says
-    /// whether they are `enough`.
-    #[inline(never)]
-    pub(super) fn settle(&mut self, near: u32, slow: u32, enough: u8) -> bool {
-        if self.feedback.fresh {
-            let still = self.error().unsigned_abs() <= near
-                && self.feedback.velocity.unsigned_abs() <= slow;
-            self.settled = if still {
-                self.settled.saturating_add(1)
-            } else {
-                0
-            };
-        }
-        self.settled >= enough
     }
 
     /// The mode whose RPDO is sent: the new one while the mode is being changed.
@@ -288,16 +354,21 @@ impl Axis {
         out: &mut AxisCommand,
     ) {
         let mode = self.sent_mode(config);
-        let end = fixed::round(self.sample(END).position);
+        let end = match lead {
+            Lead::Actual if self.feedback.fresh => self.feedback.position,
+            Lead::Actual => self.target,
+            _ => fixed::round(self.sample(END).position),
+        };
+        let rests = matches!(lead, Lead::Rest | Lead::Actual);
         out.mode = mode;
         out.controlword = word;
         self.target = match mode {
-            Mode::ProfilePosition | Mode::Homing if lead != Lead::Rest => {
+            Mode::ProfilePosition | Mode::Homing if !rests => {
                 out.controlword |= self.led.bits(lead == Lead::Halt);
                 self.led.target
             }
             Mode::CyclicPosition | Mode::ProfilePosition => end,
-            _ if lead == Lead::Rest => 0,
+            _ if rests => 0,
             Mode::CyclicTorque => {
                 let most = i32::from(config.torque_max);
                 end.min(most).max(-most)
@@ -305,9 +376,8 @@ impl Axis {
             _ if lead == Lead::Fault => config.scale.rpm(self.sample(END).velocity) as i32,
             _ => {
                 // Not by `sample`: the loop is another part of the axis.
-                let at = |ahead: u32| self.count.wrapping_add(ahead) as usize % RING;
-                let [now, ahead, beyond] = [0, END, AHEAD].map(|ahead| self.samples.get(at(ahead)));
-                let (Some(now), Some(ahead), Some(beyond)) = (now, ahead, beyond) else {
+                let at = |ahead: u32| self.samples.get(place(self.count, ahead));
+                let (Some(now), Some(ahead), Some(beyond)) = (at(0), at(END), at(AHEAD)) else {
                     return;
                 };
                 let window = Window {
@@ -324,4 +394,14 @@ impl Axis {
         out.acceleration = self.up;
         out.deceleration = self.down;
     }
+}
+
+/// Counts consecutive cycles in which something holds.
+fn count_if(cycles: &mut u8, holds: bool) {
+    *cycles = if holds { cycles.saturating_add(1) } else { 0 };
+}
+
+/// Where in the ring the sample of so many steps after `count` is.
+const fn place(count: u32, ahead: u32) -> usize {
+    count.wrapping_add(ahead) as usize % RING
 }

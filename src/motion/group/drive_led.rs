@@ -133,9 +133,9 @@ impl DriveLed {
 
     /// Whether it is done; an error if a handshake takes more than `limit` cycles,
     /// or homing longer than it may.
-    pub(super) fn outcome(&self, mode: Mode, limit: u32) -> Result<Option<i32>, FaultCause> {
+    pub(super) fn outcome(&self, mode: Mode, limit: u32) -> Result<bool, FaultCause> {
         let limit = match (mode, self.phase) {
-            (_, Phase::Done) => return Ok(Some(0)),
+            (_, Phase::Done) => return Ok(true),
             (Mode::Homing, _) => self.limit,
             // The drive moves as long as it needs.
             (_, Phase::Running) => u32::MAX,
@@ -144,6 +144,6 @@ impl DriveLed {
         if self.waited > limit {
             return Err(FaultCause::NotDone { mode });
         }
-        Ok(None)
+        Ok(false)
     }
 }

@@ -14,7 +14,10 @@ mod watch;
 pub use drive_led::SetPoint;
 pub use order::Order;
 
-use self::axis::{Axis, Lead};
+use self::axis::{
+    AT_REST, Axes, Axis, BY_DRIVE, BY_POSITION, ENABLED, ENDED, HEARD, Lead, PASSING, PLACED,
+    REACHED, SILENT, SLOW, Seen,
+};
 use super::contract::{Cell, Event, cell};
 use super::mode::Mode;
 use super::path::{Knot, Point};
@@ -111,37 +114,40 @@ pub struct ModeWanted {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TooLate;
 
-/// A set of axes: bit n for axis n.
-type Axes = u32;
-
 const fn bit(n: usize) -> Axes {
     1 << (n % Axes::BITS as usize)
 }
 
+/// Takes the first out of a set.
+fn next(axes: &mut Axes) -> Option<usize> {
+    let first = axes.trailing_zeros();
+    *axes &= axes.wrapping_sub(1);
+    (first < Axes::BITS).then_some(first as usize)
+}
+
 /// `N` axes moved in step; see the module.
 ///
-/// Until it is configured all of it is 0, so that it needs no room in an image.
+/// Until it is configured all of it is 0, so that it needs no room in an image. Small
+/// fields stand first, where they are reached by short instructions.
+#[repr(C)]
 pub struct Group<const N: usize> {
-    config: Option<&'static GroupConfig<N>>,
-    axes: [Axis; N],
     state: GroupState,
-    now: Instant,
-    /// Steps so far, and since the state was entered.
-    count: u32,
-    since: u32,
-    /// Nobody wants the axes enabled.
-    unwanted: bool,
-    /// What was ordered since the last step; to enable: nothing.
-    ordered: Order,
-    /// Whose path is replaced by one that is announced, and from which step on.
-    announced: Axes,
-    start: u32,
     /// Where all axes go together while enabling.
     stage: Goal,
+    /// Nobody wants the axes enabled.
+    unwanted: bool,
     /// Since the fault, the network has gone down, or an axis at fault is left
     /// out.
     network_was_down: bool,
     network_ready: bool,
+    config: Option<&'static GroupConfig<N>>,
+    /// Steps so far, since the state was entered, and since the stage was set.
+    count: u32,
+    since: u32,
+    staged: u32,
+    /// Whose path is replaced by one that is announced, and from which step on.
+    announced: Axes,
+    start: u32,
     /// Left out since the group began to enable: nothing is asked of them.
     absent: Axes,
     /// A fault of them has been reported.
@@ -152,6 +158,10 @@ pub struct Group<const N: usize> {
     coasting: Axes,
     /// Their part of the last path is not done yet.
     busy: Axes,
+    /// What was ordered since the last step; to enable: nothing.
+    ordered: Order,
+    now: Instant,
+    axes: [Axis; N],
     events: Events,
 }
 
@@ -194,6 +204,7 @@ impl<const N: usize> Group<N> {
         now: Instant::ZERO,
         count: 0,
         since: 0,
+        staged: 0,
         unwanted: false,
         ordered: Order::Enable,
         announced: 0,
@@ -224,9 +235,22 @@ impl<const N: usize> Group<N> {
     pub fn configure(&mut self, config: &'static GroupConfig<N>) {
         self.config = Some(config);
         let ramp = config.ramp_min as f32;
-        for axis in &mut self.axes {
+        for (axis, limits) in self.axes.iter_mut().zip(&config.axes) {
             axis.set_ramps(ramp, ramp);
+            axis.take_mode(limits);
         }
+    }
+
+    /// Those of which all of `what` is seen.
+    #[inline(never)]
+    fn which(&self, what: Seen) -> Axes {
+        let join = |axes, axis: &Axis| axes << 1 | Axes::from(axis.seen & what == what);
+        self.axes.iter().rev().fold(0, join)
+    }
+
+    /// All axes that are there.
+    const fn here(&self) -> Axes {
+        (bit(N) - 1) & !self.absent
     }
 
     /// The state after the last step.
@@ -246,7 +270,7 @@ impl<const N: usize> Group<N> {
         let axis = self.axes.get(axis)?;
         Some(AxisView {
             mode: axis.mode(config),
-            state: axis.state(),
+            state: (axis.seen & HEARD != 0).then_some(axis.state),
             feedback: axis.feedback,
             reference: axis.head(),
             following_error: axis.error(),
@@ -375,6 +399,7 @@ impl<const N: usize> Group<N> {
             && axis.wanted == Some(confirmed.mode)
         {
             axis.changed = axis.wanted.take();
+            axis.take_mode(config);
             axis.hold_actual(config);
         }
     }
@@ -389,14 +414,17 @@ impl<const N: usize> Group<N> {
     ) {
         let Some(config) = self.config else { return };
         self.now += config.cycle;
-        self.count = self.count.wrapping_add(1);
         self.since = self.since.saturating_add(1);
+        self.staged = self.staged.saturating_add(1);
+        self.count = self.count.wrapping_add(1);
         let mut cut = 0;
         if self.start == self.count {
             cut = core::mem::take(&mut self.announced);
         }
-        for (n, (axis, feedback)) in self.axes.iter_mut().zip(feedback).enumerate() {
-            if let Some(state) = axis.hear(feedback, self.count, cut & bit(n) != 0) {
+        let axes = self.axes.iter_mut().zip(&config.axes).zip(feedback);
+        for (n, ((axis, limits), feedback)) in axes.enumerate() {
+            let cut = cut & bit(n) != 0;
+            if let Some(state) = axis.hear(feedback, self.count, cut, limits, config) {
                 let axis = n as u8;
                 self.events.report(GroupEvent::AxisState { axis, state });
             }
@@ -405,24 +433,34 @@ impl<const N: usize> Group<N> {
         self.obey(inputs, config);
         self.advance(config);
         let (command, lead) = sent(self.state);
+        // Quick stop leaves a drive that is braking by itself on its ramp and cannot
+        // enable anything.
+        let mut left = 0;
+        if lead == Some(Lead::Fault) {
+            left = self.excluded | self.which(BY_DRIVE);
+        }
         let axes = self.axes.iter_mut().zip(&config.axes).zip(out);
-        for (n, ((axis, config_of), out)) in axes.enumerate() {
-            let (mut command, mut led) = (command, lead.unwrap_or(Lead::Rest));
+        for (n, ((axis, limits), out)) in axes.enumerate() {
+            let (mut led, mut word) = (Lead::Rest, ControlWord::new(command));
             if self.absent & bit(n) != 0 {
-                (command, led) = (Command::DisableVoltage, Lead::Rest);
-            } else if led == Lead::Fault
-                && (self.excluded & bit(n) != 0 || axis.mode(config_of).is_led_by_drive())
-            {
-                // It leaves a drive that is braking by itself on its ramp and cannot
-                // enable anything.
-                (command, led) = (Command::QuickStop, Lead::Rest);
-            }
-            let word = if lead.is_none() && self.absent & bit(n) == 0 {
-                axis.machine.step(self.now, axis.fresh_status())
+                word = ControlWord::new(Command::DisableVoltage);
+            } else if left & bit(n) != 0 {
+                word = ControlWord::new(Command::QuickStop);
+            } else if let Some(lead) = lead {
+                led = lead;
             } else {
-                ControlWord::new(command)
-            };
-            axis.command(word.0, led, config_of, &config.tuning, out);
+                led = Lead::Actual;
+                word = if axis.feedback.fresh {
+                    axis.machine.follow(self.now, axis.state)
+                } else {
+                    axis.machine.word()
+                };
+                axis.seen &= !REACHED;
+                if axis.machine.reached() {
+                    axis.seen |= REACHED;
+                }
+            }
+            axis.command(word.0, led, limits, &config.tuning, out);
         }
     }
 
@@ -442,6 +480,10 @@ impl<const N: usize> Group<N> {
         self.since = 0;
         self.events.report(GroupEvent::State { from, to });
         self.announced = 0;
+        // What came to rest before does not count.
+        for axis in &mut self.axes {
+            axis.seen &= !PASSING;
+        }
         match to {
             GroupState::Enabling => {
                 self.faulted = 0;
@@ -457,18 +499,15 @@ impl<const N: usize> Group<N> {
                 self.network_was_down = false;
                 // Axes that their drives do not hold enabled are excluded; that is
                 // news only if they were.
-                self.excluded = self.absent;
-                for (n, axis) in self.axes.iter().enumerate() {
-                    if !axis.is_enabled() {
-                        self.excluded |= bit(n);
-                    }
-                }
+                self.excluded = !(self.which(ENABLED) & self.here());
                 self.coasting = self.absent;
                 if from == GroupState::Enabling {
                     self.coasting = self.excluded;
                 }
                 self.stop(true);
             }
+            // Where the drives come to rest is theirs to say.
+            GroupState::QuickStop => self.hold_actual(),
             // At the end of a motion the axes are where they should be.
             GroupState::Standby if from != GroupState::Moving => self.hold_actual(),
             _ => {}
@@ -482,7 +521,7 @@ impl<const N: usize> Group<N> {
         let mut fastest = 0.0f32;
         let axes = self.axes.iter().zip(&config.axes).zip(&mut speeds);
         for (n, ((axis, config), speed)) in axes.enumerate() {
-            if (self.excluded | self.absent) & bit(n) == 0 {
+            if self.here() & !self.excluded & bit(n) != 0 {
                 *speed = axis.speed(fault, config);
                 fastest = fastest.max(speed.abs());
             }
@@ -493,7 +532,7 @@ impl<const N: usize> Group<N> {
                 continue;
             };
             let slope = axis.stop(cycles, speed, config);
-            if axis.mode(config).has_position() {
+            if axis.seen & BY_POSITION != 0 {
                 self.set_ramps(n, slope, slope);
             }
         }
@@ -501,7 +540,9 @@ impl<const N: usize> Group<N> {
 
     fn set_stage(&mut self, stage: Goal) {
         self.stage = stage;
+        self.staged = 0;
         for axis in &mut self.axes {
+            axis.seen &= !REACHED;
             axis.machine.set_goal(stage, self.now);
         }
     }
@@ -520,7 +561,7 @@ impl<const N: usize> Group<N> {
             GroupState::Idle | GroupState::Standby | GroupState::Faulted | GroupState::Halt => {
                 false
             }
-            GroupState::Enabling | GroupState::Disabling => self.next_stage(config),
+            GroupState::Enabling | GroupState::Disabling => self.next_stage(),
             GroupState::Moving | GroupState::Homing => {
                 self.arrive(true, config) && self.state == GroupState::Homing
             }
@@ -543,20 +584,9 @@ impl<const N: usize> Group<N> {
     }
 
     /// All axes reach a state before the next transition is commanded.
-    fn next_stage(&mut self, config: &GroupConfig<N>) -> bool {
-        // The target is the actual position until the drive follows it.
-        self.hold_actual();
-        let (mut reached, mut rest) = (true, true);
-        for (n, axis) in self.axes.iter().enumerate() {
-            if self.absent & bit(n) == 0 {
-                let AxisFeedback {
-                    fresh, velocity, ..
-                } = axis.feedback;
-                reached &= axis.machine.reached();
-                rest &= fresh && velocity.unsigned_abs() <= config.standstill_rpm;
-            }
-        }
-        if !reached {
+    fn next_stage(&mut self) -> bool {
+        let here = self.here();
+        if here & !self.which(REACHED) != 0 {
             return false;
         }
         let next = match self.stage {
@@ -567,6 +597,7 @@ impl<const N: usize> Group<N> {
             Goal::Enabled | Goal::QuickStop => {
                 // A drive that was switched off in motion may have been enabled
                 // before its axis stood: it brakes first.
+                let rest = here & !self.which(SLOW) == 0;
                 for axis in self.axes.iter_mut().filter(|_| rest) {
                     axis.home = axis.feedback.position;
                 }
@@ -579,84 +610,75 @@ impl<const N: usize> Group<N> {
 
     /// Whether every axis has come to rest, `on_target` or wherever it is.
     fn arrive(&mut self, on_target: bool, config: &GroupConfig<N>) -> bool {
-        let mut all = self.announced == 0;
-        let mut waiting = !(self.absent | self.announced);
+        let mut waiting = self.here() & !self.announced;
         if on_target {
             waiting &= self.busy;
         }
-        let (enable, settle) = (config.enable_timeout, config.settle_timeout);
-        for (n, (axis, limits)) in self.axes.iter_mut().zip(&config.axes).enumerate() {
-            if waiting & bit(n) == 0 {
+        // The path of an axis that its drive leads is over all the time.
+        let mut ready = waiting & self.which(ENDED);
+        while let Some(n) = next(&mut ready) {
+            let (Some(axis), Some(limits)) = (self.axes.get_mut(n), config.axes.get(n)) else {
                 continue;
-            }
-            let mode = axis.mode(limits);
-            let near = on_target && mode.has_position();
-            let failed = if on_target && mode.is_led_by_drive() {
-                match axis.led.outcome(mode, config.cycles(enable)) {
-                    Ok(None) => {
-                        all = false;
-                        continue;
-                    }
-                    outcome => outcome.err(),
-                }
-            } else if !axis.ended() {
-                all = false;
-                continue;
-            } else {
-                let most = if near { limits.in_position } else { u32::MAX };
-                let rests = axis.settle(most, config.standstill_rpm, config.settle_cycles);
-                if !rests && axis.waited() <= config.cycles(settle) {
-                    all = false;
-                    continue;
-                }
-                let error = axis.error();
-                (!rests).then_some(FaultCause::NotArrived { error })
             };
-            if let Some(cause) = failed {
-                self.fault(Some(n as u8), cause, Event::Late);
-                return false;
+            let near = on_target && axis.seen & BY_POSITION != 0;
+            let rest = if near { PLACED } else { AT_REST };
+            let outcome = if on_target && axis.seen & BY_DRIVE != 0 {
+                let limit = config.cycles(config.enable_timeout);
+                axis.led.outcome(axis.mode(limits), limit)
+            } else if axis.seen & rest != 0 {
+                Ok(true)
+            } else if axis.waited() > config.cycles(config.settle_timeout) {
+                let error = axis.error();
+                Err(FaultCause::NotArrived { error })
+            } else {
+                Ok(false)
+            };
+            match outcome {
+                Ok(false) => continue,
+                Err(cause) => {
+                    self.fault(Some(n as u8), cause, Event::Late);
+                    return false;
+                }
+                Ok(true) => {}
             }
+            waiting &= !bit(n);
             self.busy &= !bit(n);
             if on_target {
-                if mode == Mode::Homing {
+                let mut error = 0;
+                if near {
+                    error = axis.error();
+                } else if self.state == GroupState::Homing {
                     axis.home = 0;
                 }
                 self.events.report(GroupEvent::Arrived {
                     axis: n as u8,
                     target: axis.head(),
-                    error: if near { axis.error() } else { 0 },
+                    error,
                 });
             }
         }
-        all
+        self.announced == 0 && waiting == 0
     }
 
     /// After a quick stop or a fault: waits for standstill, for as long as an axis
     /// may take. Axes that report nothing are not waited for.
     fn comes_to_rest(&mut self, config: &GroupConfig<N>) -> bool {
-        let mut moving = 0;
-        for (n, axis) in self.axes.iter_mut().enumerate() {
-            let rests = axis.path.is_over()
-                && axis.settle(u32::MAX, config.standstill_rpm, config.settle_cycles);
-            if !rests && self.absent & bit(n) == 0 && axis.missing < config.missing_tpdo_max {
-                moving |= bit(n);
-            }
+        let mut moving = self.here() & !(self.which(AT_REST) | self.which(SILENT));
+        if moving == 0 {
+            return true;
         }
         let fastest = |most: u32, axis: &AxisConfig| most.max(axis.velocity_max);
         let fastest = config.axes.iter().fold(0, fastest);
         let patience = config.cycles(config.settle_timeout) + stop_cycles(fastest as f32, config);
-        if moving != 0 && self.since > patience {
-            for (n, axis) in self.axes.iter().enumerate() {
-                if moving & bit(n) != 0 {
-                    self.events.report(GroupEvent::NotAtRest {
-                        axis: n as u8,
-                        velocity: axis.feedback.velocity,
-                    });
-                }
+        if self.since > patience {
+            while let Some(n) = next(&mut moving) {
+                let velocity = self.axes.get(n).map_or(0, |axis| axis.feedback.velocity);
+                let axis = n as u8;
+                self.events.report(GroupEvent::NotAtRest { axis, velocity });
             }
             self.happen(Event::Late);
         }
-        moving == 0
+        false
     }
 }
 

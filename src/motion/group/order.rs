@@ -1,9 +1,10 @@
 //! Orders to the group, judged at once and carried out in the next step.
 
-use super::{Group, Inputs, bit};
+use super::axis::{FRESH, SLOW};
+use super::{Group, Inputs, bit, next};
 use crate::motion::contract::{Cell, Event, cell};
 use crate::motion::mode::Mode;
-use crate::motion::{AxisFeedback, GroupConfig, GroupEvent, GroupState, Refusal};
+use crate::motion::{GroupConfig, GroupEvent, GroupState, Refusal};
 
 /// What the group is told to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -79,10 +80,10 @@ impl<const N: usize> Group<N> {
                 return Err(Refusal::Busy);
             }
             Order::Stop | Order::QuickStop => {}
-            _ if self.ordered != Order::Enable => return Err(Refusal::Busy),
+            _ if self.ordered.event().is_some() => return Err(Refusal::Busy),
             _ => self.permit(order)?,
         }
-        self.unwanted |= order == Order::QuickStop;
+        self.unwanted |= event == Event::QuickStop;
         self.ordered = order;
         Ok(())
     }
@@ -92,37 +93,43 @@ impl<const N: usize> Group<N> {
         let Some(config) = self.config else {
             return Err(Refusal::NetworkNotReady);
         };
-        if order == Order::Reset && !self.network_ready {
-            return Err(Refusal::NetworkNotReady);
-        }
-        for (n, (axis, limits)) in self.axes.iter().zip(&config.axes).enumerate() {
-            if self.absent & bit(n) != 0 {
+        let mut look = self.here();
+        let (wanted, other) = match order {
+            Order::Reset if !self.network_ready => return Err(Refusal::NetworkNotReady),
+            Order::Release => (0, Mode::Homing),
+            Order::SetMode { axes, mode } => (axes, mode),
+            Order::Home { axes, .. } => {
+                look &= axes;
+                (0, Mode::Homing)
+            }
+            _ => return Ok(()),
+        };
+        while let Some(n) = next(&mut look) {
+            let (Some(of), Some(limits)) = (self.axes.get(n), config.axes.get(n)) else {
+                continue;
+            };
+            let (axis, mode) = (n as u8, of.mode(limits));
+            if matches!(order, Order::Home { .. }) {
+                if mode != Mode::Homing {
+                    return Err(Refusal::WrongMode { axis, mode });
+                }
                 continue;
             }
-            let AxisFeedback {
-                velocity, fresh, ..
-            } = axis.feedback;
-            let moves = velocity.unsigned_abs() > config.standstill_rpm;
-            let (mode, supported) = (axis.mode(limits), limits.modes);
-            let axis = n as u8;
-            let refusal = match order {
-                Order::Release | Order::SetMode { .. } if !fresh => Refusal::NotFresh { axis },
-                Order::Release | Order::SetMode { .. } if moves => {
-                    Refusal::NotAtRest { axis, velocity }
-                }
-                Order::Home { axes, .. } if axes & bit(n) != 0 && mode != Mode::Homing => {
-                    Refusal::WrongMode { axis, mode }
-                }
-                Order::SetMode { axes, mode } if axes & bit(n) != 0 && !mode.is_in(supported) => {
-                    Refusal::ModeNotSupported {
-                        axis,
-                        mode,
-                        supported,
-                    }
-                }
-                _ => continue,
-            };
-            return Err(refusal);
+            if of.seen & FRESH == 0 {
+                return Err(Refusal::NotFresh { axis });
+            }
+            if of.seen & SLOW == 0 {
+                let velocity = of.feedback.velocity;
+                return Err(Refusal::NotAtRest { axis, velocity });
+            }
+            let supported = limits.modes;
+            if wanted & bit(n) != 0 && !other.is_in(supported) {
+                return Err(Refusal::ModeNotSupported {
+                    axis,
+                    mode: other,
+                    supported,
+                });
+            }
         }
         Ok(())
     }
@@ -161,25 +168,25 @@ impl<const N: usize> Group<N> {
 
     /// What a transition needs to know of its order.
     fn carry_out(&mut self, order: Order, config: &GroupConfig<N>) {
-        let of = match (order, self.state) {
+        let mut of = match (order, self.state) {
             (Order::Release, GroupState::Moving) => {
                 self.hold_actual();
                 self.busy = 0;
                 return;
             }
             (Order::Home { axes, .. }, GroupState::Homing)
-            | (Order::SetMode { axes, .. }, GroupState::ModeChange) => axes & !self.absent,
+            | (Order::SetMode { axes, .. }, GroupState::ModeChange) => axes & self.here(),
             _ => return,
         };
-        for (n, (axis, limits)) in self.axes.iter_mut().zip(&config.axes).enumerate() {
-            if of & bit(n) == 0 {
+        if self.state == GroupState::Homing {
+            self.busy |= of;
+        }
+        while let Some(n) = next(&mut of) {
+            let (Some(axis), Some(limits)) = (self.axes.get_mut(n), config.axes.get(n)) else {
                 continue;
-            }
+            };
             match order {
-                Order::Home { limit, .. } => {
-                    axis.led.home(limit);
-                    self.busy |= bit(n);
-                }
+                Order::Home { limit, .. } => axis.led.home(limit),
                 Order::SetMode { mode, .. } => {
                     axis.wanted = (axis.mode(limits) != mode).then_some(mode);
                     axis.hold_actual(limits);

@@ -1,7 +1,8 @@
 //! Supervision: what stops the group.
 
-use super::{Event, Group, Inputs, bit};
-use crate::cia402::{Goal, StatusWord};
+use super::axis::{BY_DRIVE, BY_POSITION, ENABLED, FAILED, FRESH, HEARD, REACHED, SILENT, SOUND};
+use super::{Event, Group, Inputs, bit, next};
+use crate::cia402::{Goal, StatusWord, Timeout};
 use crate::motion::mode::Mode;
 use crate::motion::{FaultCause, GroupConfig, GroupEvent, GroupState};
 
@@ -20,10 +21,17 @@ impl<const N: usize> Group<N> {
             }
             _ => {}
         }
-        for n in 0..N {
-            if self.absent & bit(n) == 0
-                && let Some(cause) = self.find_fault(n, state, inputs, config)
-            {
+        let leads = matches!(state, GroupState::Enabling | GroupState::Disabling);
+        let late = leads && self.staged > config.cycles(config.enable_timeout);
+        let mut look = self.here();
+        if leads {
+            let late = if late { !self.which(REACHED) } else { 0 };
+            look &= self.which(FAILED) | self.which(SILENT) | inputs.absent | late;
+        } else {
+            look &= !self.which(SOUND) | inputs.absent;
+        }
+        while let Some(n) = next(&mut look) {
+            if let Some(cause) = self.find_fault(n, state, late, inputs, config) {
                 self.fault(Some(n as u8), cause, Event::Fault);
             }
         }
@@ -38,13 +46,14 @@ impl<const N: usize> Group<N> {
         &mut self,
         n: usize,
         state: GroupState,
+        late: bool,
         inputs: &Inputs,
         config: &GroupConfig<N>,
     ) -> Option<FaultCause> {
         let (axis, limits) = (self.axes.get_mut(n)?, config.axes.get(n)?);
         let faulted = self.faulted & bit(n) != 0;
         let mode = axis.mode(limits);
-        let by_drive = mode.is_led_by_drive();
+        let (seen, by_drive) = (axis.seen, axis.seen & BY_DRIVE != 0);
         if by_drive
             && matches!(state, GroupState::Moving | GroupState::Homing)
             && let Err(cause) = axis.led.hear(mode, axis.fresh_status())
@@ -54,20 +63,21 @@ impl<const N: usize> Group<N> {
         if !faulted && inputs.network_ready && inputs.absent & bit(n) != 0 {
             return Some(FaultCause::LeftOperational);
         }
-        let cycles = axis.missing;
-        if !faulted && cycles >= config.missing_tpdo_max {
+        if !faulted && seen & SILENT != 0 {
+            let cycles = axis.missing;
             return Some(FaultCause::TpdoMissing { cycles });
         }
         let leads = matches!(state, GroupState::Enabling | GroupState::Disabling);
-        if leads && let Err(timeout) = axis.machine.check(self.now, config.enable_timeout) {
-            return Some(FaultCause::NotEnabled(timeout));
+        if late && seen & REACHED == 0 {
+            let (state, goal) = (axis.machine.state(), self.stage);
+            return Some(FaultCause::NotEnabled(Timeout { state, goal }));
         }
         let stops = state == GroupState::FaultStop;
-        if !axis.feedback.fresh || (stops && self.excluded & bit(n) != 0) {
+        if seen & FRESH == 0 || (stops && self.excluded & bit(n) != 0) {
             return None;
         }
         let status = StatusWord(axis.feedback.statusword);
-        if status.is_fault() {
+        if seen & FAILED != 0 {
             // The first stage of enabling resets the faults of the past.
             let reset = leads && self.stage == Goal::Disabled;
             return (!reset).then_some(FaultCause::DriveFault { status });
@@ -75,7 +85,7 @@ impl<const N: usize> Group<N> {
         if leads || state == GroupState::QuickStop {
             return None;
         }
-        if !(status.is_enabled() || (stops && by_drive)) {
+        if !(seen & ENABLED != 0 || (stops && by_drive)) {
             return Some(FaultCause::LeftEnabled { status });
         }
         if self.state == GroupState::FaultStop || axis.wanted.is_some() {
@@ -86,7 +96,7 @@ impl<const N: usize> Group<N> {
             return Some(FaultCause::DriveError { status });
         }
         let (allowed, error) = (limits.following_error_max, axis.error());
-        if mode.has_position() && error.unsigned_abs() > allowed {
+        if seen & BY_POSITION != 0 && error.unsigned_abs() > allowed {
             return Some(FaultCause::FollowingError { error, allowed });
         }
         axis.path.is_dry().then_some(FaultCause::PathDry)
@@ -107,11 +117,11 @@ impl<const N: usize> Group<N> {
 
     /// Axes whose drives have left operation enabled, each reported once.
     fn exclude_lost_axes(&mut self) {
-        for (n, axis) in self.axes.iter().enumerate() {
-            let Some(state) = axis.state() else { continue };
-            if !state.is_enabled() && self.coasting & bit(n) == 0 {
-                self.coasting |= bit(n);
-                self.excluded |= bit(n);
+        let mut lost = self.which(HEARD) & !(self.which(ENABLED) | self.coasting);
+        self.coasting |= lost;
+        self.excluded |= lost;
+        while let Some(n) = next(&mut lost) {
+            if let Some(state) = self.axes.get(n).map(|axis| axis.state) {
                 let axis = n as u8;
                 self.events.report(GroupEvent::Coasting { axis, state });
             }
