@@ -80,6 +80,11 @@ impl Mode {
 
     /// Those of which the path is one of positions, as bits of 6502h.
     pub(super) const WITH_POSITION: u32 = 1 << 2 | 1 << 7 | 1 << 8;
+
+    /// Whether the path is one of positions.
+    pub(super) const fn has_position(self) -> bool {
+        self.is_in(Mode::WITH_POSITION)
+    }
 }
 
 in_words!(Mode {

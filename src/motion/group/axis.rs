@@ -161,7 +161,7 @@ impl Axis {
         self.seen &= !(BY_DRIVE | BY_POSITION);
         if mode.is_led_by_drive() {
             self.seen |= BY_DRIVE;
-        } else if mode != Mode::CyclicTorque {
+        } else if mode.has_position() {
             self.seen |= BY_POSITION;
         }
     }
