@@ -193,15 +193,16 @@ fn default(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cargo;
     use crate::machine::DESCRIPTION;
-    use crate::{cargo, library};
     use canmaster_network::Source;
     use canmaster_network::object::Address as At;
+    use canmaster_sim::world::library;
 
     fn sample() -> Eds {
         let outcome = canmaster_network::load(&cargo::workspace().join(DESCRIPTION));
         let machine = outcome.machine.unwrap();
-        eds(&machine, 0, library::network(&machine, 0).unwrap())
+        eds(&machine, 0, library::network_of_bus(&machine, 0).unwrap())
     }
 
     #[test]

@@ -355,3 +355,16 @@ fn a_run_that_fails_names_the_node_and_ends_with_exit_code_one() {
     let words = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
     assert!(words.contains("node 5"), "{words}");
 }
+
+#[test]
+fn a_reader_that_has_seen_enough_is_no_defect() {
+    let mut child = std::process::Command::new(assert_cmd::cargo::cargo_bin("xtask"))
+        .arg("check")
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let outcome = child.wait_with_output().unwrap();
+    assert_eq!(String::from_utf8_lossy(&outcome.stderr), "");
+}
