@@ -253,7 +253,7 @@ impl AxisPdos {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::network::sample::SIX_EPOS4;
+    use crate::network::sample::SIX_EPOS4_10_MS as SIX_EPOS4;
 
     fn pdos() -> [AxisPdos; 6] {
         AxisPdos::of_all(&SIX_EPOS4).unwrap()
@@ -266,8 +266,10 @@ mod tests {
     }
 
     #[test]
-    fn the_sample_network_has_these_pdos() {
+    fn the_sample_networks_have_these_pdos() {
         assert_eq!(AxisPdos::tpdo_bytes(&pdos()), [[6, 6]; 6]);
+        let fast = AxisPdos::of_all(&crate::network::sample::SIX_EPOS4).unwrap();
+        assert_eq!(AxisPdos::tpdo_bytes(&fast), [[6, 0]; 6]);
         assert_eq!(AxisPdos::of_all::<7>(&SIX_EPOS4), None);
     }
 

@@ -262,5 +262,5 @@ const SAMPLE_CYCLE: Duration = Duration::from_millis(10);
 
 static SAMPLE_STEPS: [Step<6>; 3] = steps(&[Motor::SAMPLE; 6], SAMPLE_CYCLE);
 
-/// The group of six axes of the sample network, at a cycle of 10 ms.
+/// Six axes like those of the sample network, at a cycle of 10 ms.
 pub static GROUP: GroupConfig<6> = group(&[Motor::SAMPLE; 6], SAMPLE_CYCLE, 3, &SAMPLE_STEPS);

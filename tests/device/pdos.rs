@@ -1,7 +1,7 @@
 //! The mirror of the nodes' PDOs and the process image.
 
 use crate::rig::Bench;
-use canmaster::network::sample::SIX_EPOS4;
+use canmaster::network::sample::SIX_EPOS4_10_MS as SIX_EPOS4;
 use canmaster::pdo::MappingEntry;
 
 #[test]

@@ -2,7 +2,7 @@
 
 use canmaster::boot::Event as Step;
 use canmaster::device::{Board, Description, Device, Event, Identity};
-use canmaster::network::sample::SIX_EPOS4;
+use canmaster::network::sample::SIX_EPOS4_10_MS as SIX_EPOS4;
 use canmaster::nmt::{NodeControl, State};
 use canmaster::sdo::AbortCode;
 use canmaster::sync::SyncLimits;

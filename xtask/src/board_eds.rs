@@ -230,11 +230,11 @@ mod tests {
         let entry = |index, sub| eds.entry(At::new(index, sub)).unwrap();
         assert_eq!(entry(0x1006, 0).data_type, DataType::Unsigned(32));
         assert_eq!(entry(0x1006, 0).access, Access::ReadWrite);
-        assert_eq!(entry(0x1006, 0).default.unwrap().value, 10_000);
+        assert_eq!(entry(0x1006, 0).default.unwrap().value, 2_000);
         assert_eq!(entry(0x1017, 0).default.unwrap().value, 50);
-        assert_eq!(entry(0x1A00, 1).default.unwrap().value, 0x3001_0510);
+        assert_eq!(entry(0x1A00, 1).default.unwrap().value, 0x3001_0310);
         assert_eq!(entry(0x3001, 1).name, "Statusword");
-        assert_eq!(entry(0x3001, 5).name, "Controlword");
+        assert_eq!(entry(0x3001, 3).name, "Controlword");
         assert_eq!(entry(0x1F22, 6).data_type, DataType::Domain);
         assert_eq!(entry(0x1F82, 0x80).access, Access::WriteOnly);
         assert_eq!(eds.entry(At::new(0x1F22, 7)), None);

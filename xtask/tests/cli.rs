@@ -107,7 +107,7 @@ fn machine(folder: &tempfile::TempDir, name: &str, change: impl Fn(String) -> St
 fn a_machine_that_cannot_work_is_refused_in_the_same_words_before_anything_is_built() {
     let folder = tempfile::tempdir().unwrap();
     let file = machine(&folder, "refused", |text| {
-        text.replace("cycle_us = 10_000", "cycle_us = 4_000")
+        text.replace("cycle_us = 2_000", "cycle_us = 1_500")
             .replace("\"Statusword\", ", "\"Statusward\", ")
     });
     let checked = stderr(&xtask().arg("check").arg(&file).assert().code(1));
@@ -157,7 +157,7 @@ fn a_machine_of_ones_own_is_built_and_runs() {
             .replace("increments_per_turn = 2000", "increments_per_turn = 4096")
             .replace("gear = [1, 1]", "gear = [5, 4]")
             .replace("max_speed = 3_000 ", "max_speed = 600 ")
-            .replace("cycle_us = 10_000", "cycle_us = 8_000")
+            .replace("cycle_us = 2_000", "cycle_us = 8_000")
             .replace('\n', "\r\n")
     });
     let assert = xtask()

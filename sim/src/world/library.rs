@@ -130,17 +130,28 @@ mod tests {
     use super::*;
     use std::path::Path;
 
+    use canmaster::network::sample::{SIX_EPOS4, SIX_EPOS4_10_MS};
+
     fn sample() -> Machine {
-        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../network.toml");
-        canmaster_network::load(&file).machine.unwrap()
+        described("network.toml")
+    }
+
+    fn described(file: &str) -> Machine {
+        let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        canmaster_network::load(&workspace.join(file))
+            .machine
+            .unwrap()
     }
 
     #[test]
-    fn the_sample_is_the_network_that_the_firmware_has() {
-        assert_eq!(
-            format!("{:#?}", network_of_bus(&sample(), 0).unwrap()),
-            format!("{:#?}", canmaster::network::sample::SIX_EPOS4)
-        );
+    fn the_samples_are_the_networks_that_the_library_has() {
+        for (file, ours) in [
+            ("network.toml", &SIX_EPOS4),
+            ("networks/one_bus_10ms.toml", &SIX_EPOS4_10_MS),
+        ] {
+            let read = network_of_bus(&described(file), 0).unwrap();
+            assert_eq!(format!("{read:#?}"), format!("{ours:#?}"));
+        }
     }
 
     #[test]

@@ -58,16 +58,16 @@ pub struct Machine {
 
 /// The sample: six EPOS4.
 pub fn sample() -> &'static Machine {
-    static SAMPLE: LazyLock<Machine> = LazyLock::new(|| Machine {
-        network: &SIX_EPOS4,
-        segments: vec![sample_segment()],
-        motors: vec![Motor::SAMPLE; SIX_EPOS4.nodes.len()],
-        moves: moves(experiment::GROUP.program.steps),
-        round_trip: experiment::GROUP
-            .program
-            .duration(&experiment::GROUP)
-            .ok()
-            .map(Time::from),
+    static SAMPLE: LazyLock<Machine> = LazyLock::new(|| {
+        let motors = vec![Motor::SAMPLE; SIX_EPOS4.nodes.len()];
+        let (moves, round_trip) = program(&motors, SIX_EPOS4.cycle).unwrap_or_default();
+        Machine {
+            network: &SIX_EPOS4,
+            segments: vec![sample_segment()],
+            motors,
+            moves,
+            round_trip,
+        }
     });
     &SAMPLE
 }
