@@ -132,6 +132,7 @@ impl<const N: usize> Dictionary<N> {
     }
 
     /// Takes note of a step of the boot-up.
+    #[inline(never)]
     pub(super) fn on_boot_event(&mut self, event: &boot::Event) {
         let Some(status) = NodeStatus::after(event) else {
             return;
@@ -150,9 +151,9 @@ impl<const N: usize> Dictionary<N> {
         // A node that was never heard counts as lost when its boot time is over.
         if let boot::Event::Failed(_, failure) = event
             && failure.cause == boot::Cause::NoBootUp
-            && record.presence == Presence::Unknown
+            && record.presence == Presence::UNKNOWN
         {
-            record.presence = Presence::Missing;
+            record.presence = Presence::MISSING;
         }
     }
 }

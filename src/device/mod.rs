@@ -52,7 +52,7 @@ use crate::frame::{Frame, MAX_DATA};
 use crate::id::{Address, NodeId};
 use crate::network::Network;
 use crate::nmt::{NodeControl, Service, State, Target};
-use crate::od::Entry;
+use crate::od::{Chunk, Entry, Part};
 use crate::sdo::{AbortCode, Server};
 use crate::sync::SyncLimits;
 use crate::time::{Duration, Instant};
@@ -111,13 +111,48 @@ pub trait Board {
     /// What the client is told: 08000022h if it would not.
     fn may_request(&mut self, control: NodeControl) -> Result<(), AbortCode>;
 
-    /// The entry `sub` of 2F20h: what the board measures of itself.
-    fn measured(&mut self, _sub: u8) -> u32 {
-        0
+    /// The value of an entry that the board answers for; 2F20h: what it measures of
+    /// itself. Of a signed entry the bits.
+    ///
+    /// # Errors
+    /// What the client is told.
+    fn number(&mut self, at: Address) -> Result<u32, AbortCode> {
+        let _ = at;
+        Ok(0)
     }
 
-    /// 2F20h was written to: what it holds begins anew.
-    fn measure_anew(&mut self) {}
+    /// An entry that the board answers for was written to; 2F20h: what it holds begins
+    /// anew.
+    ///
+    /// # Errors
+    /// What the client is told.
+    fn set_number(&mut self, at: Address, value: u32) -> Result<(), AbortCode> {
+        let _ = (at, value);
+        Ok(())
+    }
+
+    /// As [`ObjectDictionary::read`](crate::od::ObjectDictionary::read), of an entry that the board answers for.
+    ///
+    /// # Errors
+    /// 06010000h unless implemented.
+    fn read(&mut self, at: Address, offset: u32, buf: &mut [u8]) -> Result<Chunk, AbortCode> {
+        let _ = (at, offset, buf);
+        Err(AbortCode::UNSUPPORTED_ACCESS)
+    }
+
+    /// As [`ObjectDictionary::write`](crate::od::ObjectDictionary::write), of an entry that the board answers for.
+    ///
+    /// # Errors
+    /// 06010000h unless implemented.
+    fn write(&mut self, at: Address, part: Part<'_>) -> Result<(), AbortCode> {
+        let _ = (at, part);
+        Err(AbortCode::UNSUPPORTED_ACCESS)
+    }
+
+    /// As [`ObjectDictionary::cancel`](crate::od::ObjectDictionary::cancel), of an entry that the board answers for.
+    fn cancel(&mut self, at: Address) {
+        let _ = at;
+    }
 
     /// The bytes of a TPDO of a node as it last came, zeros before.
     fn tpdo(&mut self, node: NodeId, number: u8) -> [u8; MAX_DATA];
@@ -211,11 +246,7 @@ impl<const N: usize> Device<N> {
     pub fn set_state(&mut self, state: State, board: &mut impl Board, now: Instant) {
         self.dictionary.state = state;
         if !state.allows(Service::Sdo) {
-            let view = &mut View {
-                dictionary: &mut self.dictionary,
-                board,
-                now,
-            };
+            let view = &mut View::new(&mut self.dictionary, board, now);
             self.server.reset(view);
         }
     }
@@ -256,7 +287,7 @@ impl<const N: usize> Device<N> {
     /// lost.
     pub fn on_node_state(&mut self, node: NodeId, state: Option<State>) {
         if let Some(record) = self.dictionary.record(node) {
-            record.presence = state.map_or(Presence::Missing, Presence::State);
+            record.presence = state.map_or(Presence::MISSING, Presence::state);
         }
     }
 
@@ -304,6 +335,7 @@ impl<const N: usize> Device<N> {
 
     /// Takes in a frame: a request to the SDO server, answered unless the NMT
     /// state forbids it, or TIME.
+    #[inline(never)]
     pub fn on_frame(
         &mut self,
         frame: &Frame,
@@ -318,11 +350,7 @@ impl<const N: usize> Device<N> {
             return None;
         }
         let before = self.time_period();
-        let view = &mut View {
-            dictionary: &mut self.dictionary,
-            board,
-            now,
-        };
+        let view = &mut View::new(&mut self.dictionary, board, now);
         let answer = self.server.on_frame(frame, now, view);
         if self.time_period() != before {
             self.start_time(now);
@@ -332,6 +360,7 @@ impl<const N: usize> Device<N> {
 
     /// Lets time pass: to be called until it returns `None`, or until there is
     /// no room for another frame.
+    #[inline(never)]
     pub fn poll(&mut self, now: Instant, board: &mut impl Board) -> Option<Frame> {
         let dictionary = &mut self.dictionary;
         dictionary.clock.advance(now);
@@ -351,11 +380,7 @@ impl<const N: usize> Device<N> {
         {
             return Some(time);
         }
-        let view = &mut View {
-            dictionary,
-            board,
-            now,
-        };
+        let view = &mut View::new(dictionary, board, now);
         self.server.poll(now, view)
     }
 

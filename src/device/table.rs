@@ -52,7 +52,8 @@ pub(super) enum Item {
     EmcyWords,
     Clock,
     TransferTest,
-    Measured,
+    /// What the board answers for: [`Board::number`](super::Board::number).
+    Board,
     EmcyCount,
     EmcyHistory,
     Process,
@@ -106,6 +107,11 @@ impl Row {
         Row::variable(at, data_type, Access::ReadWrite, Item::Setting(setting))
     }
 
+    /// An array over the nodes, by their places in the network.
+    const fn each_node(at: u16, data_type: DataType, access: Access, item: Item) -> Row {
+        Row::array(at, (1, EACH_NODE), data_type, access, item)
+    }
+
     /// The same for the objects up to `last`.
     const fn up_to(self, last: u16) -> Row {
         Row {
@@ -117,6 +123,8 @@ impl Row {
 
 /// The sub-index that means all nodes.
 pub(super) const ALL: u8 = 0x80;
+/// The last sub-index of an array over the nodes: how many there are.
+pub(super) const EACH_NODE: u8 = u8::MAX;
 /// An array whose sub-index is the node-ID.
 const NODES: (u8, u8) = (1, NodeId::MAX.get());
 /// The most objects that the 64 bits of a PDO hold.
@@ -195,7 +203,7 @@ pub(super) static TABLE: [Row; 56] = {
         Row::setting(index::COB_ID_TIME, Unsigned32, Setting::TimeCobId),
         Row::setting(index::COB_ID_EMCY, Unsigned32, Setting::EmcyCobId),
         Row::setting(index::EMCY_INHIBIT, Unsigned16, Setting::EmcyInhibit),
-        node(
+        Row::each_node(
             index::CONSUMER_HEARTBEAT,
             Unsigned32,
             ReadWrite,
@@ -327,20 +335,8 @@ pub(super) static TABLE: [Row; 56] = {
         transfer_test((1, 3), ReadWrite),
         transfer_test((4, 4), WriteOnly),
         transfer_test((5, 7), ReadOnly),
-        Row::array(
-            index::MEASURED,
-            (1, 1),
-            Unsigned32,
-            ReadWrite,
-            Item::Measured,
-        ),
-        Row::array(
-            index::MEASURED,
-            (2, 13),
-            Unsigned32,
-            ReadOnly,
-            Item::Measured,
-        ),
+        Row::array(index::MEASURED, (1, 1), Unsigned32, ReadWrite, Item::Board),
+        Row::array(index::MEASURED, (2, 13), Unsigned32, ReadOnly, Item::Board),
         Row::variable(index::EMCY_HISTORY, Unsigned8, ReadWrite, Item::EmcyCount)
             .up_to(index::EMCY_HISTORY_LAST),
         Row::array(

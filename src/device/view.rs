@@ -13,7 +13,7 @@ use crate::emcy::EmcyCobId;
 use crate::id::{Address, CobId, FunctionCode, NodeId};
 use crate::network;
 use crate::nmt::{Command, NodeControl, Target};
-use crate::od::{Access, Chunk, DataType, Entry, ObjectDictionary, Value, read_bytes};
+use crate::od::{Access, Chunk, DataType, Entry, ObjectDictionary, Part, Value, read_bytes};
 use crate::pdo::Direction;
 use crate::sdo::AbortCode;
 use crate::time::Instant;
@@ -29,14 +29,26 @@ const NOT_USED: u32 = 1 << 31;
 
 /// The dictionary in the hands of the SDO server, at a moment.
 pub(super) struct View<'a, B, const N: usize> {
-    pub(super) dictionary: &'a mut Dictionary<N>,
-    pub(super) board: &'a mut B,
-    pub(super) now: Instant,
+    dictionary: &'a mut Dictionary<N>,
+    board: &'a mut B,
+    now: Instant,
 }
 
-impl<B: Board, const N: usize> View<'_, B, N> {
-    /// The bytes of a value of fixed size.
-    fn value(&mut self, found: &Found) -> Result<u64, AbortCode> {
+impl<'a, B: Board, const N: usize> View<'a, B, N> {
+    pub(super) const fn new(
+        dictionary: &'a mut Dictionary<N>,
+        board: &'a mut B,
+        now: Instant,
+    ) -> View<'a, B, N> {
+        View {
+            dictionary,
+            board,
+            now,
+        }
+    }
+
+    /// The bytes of the value of the entry that was found, of fixed size.
+    fn value(&mut self, at: Address, found: &Found) -> Result<u64, AbortCode> {
         let dictionary = &*self.dictionary;
         let network = dictionary.network;
         let known = found.node.and_then(|id| dictionary.node(id));
@@ -90,7 +102,7 @@ impl<B: Board, const N: usize> View<'_, B, N> {
             Item::NmtRequest if found.node == Some(network.master.node) => {
                 dictionary.state.code().into()
             }
-            Item::NmtRequest => record.map_or(0, |record| record.presence.code()).into(),
+            Item::NmtRequest => record.map_or(0, |record| record.presence.0).into(),
             Item::Expected => {
                 let identity = known.map(|(node, _)| &node.identity);
                 let expected = identity.and_then(|identity| match found.place {
@@ -115,11 +127,10 @@ impl<B: Board, const N: usize> View<'_, B, N> {
             }
             Item::Clock => {
                 let time = dictionary.clock.time(self.now).ok_or(AbortCode::NO_DATA)?;
-                let [a, b, c, d, e, f] = time.encode();
-                return Ok(u64::from_le_bytes([a, b, c, d, e, f, 0, 0]));
+                return Ok(time.number());
             }
             Item::TransferTest => dictionary.transfer.word(found.n()),
-            Item::Measured => self.board.measured(found.sub),
+            Item::Board => self.board.number(at)?,
             Item::Process => {
                 let process = dictionary.process(found).ok_or(AbortCode::NO_DATA)?;
                 let (node, pdo) = (process.node, process.number);
@@ -157,8 +168,9 @@ impl<B: Board, const N: usize> ObjectDictionary for View<'_, B, N> {
         self.dictionary.entry(at)
     }
 
-    fn kind(&self, at: Address) -> Result<(DataType, Access), AbortCode> {
-        let found = self.dictionary.find(at)?;
+    fn kind(&mut self, at: Address) -> Result<(DataType, Access), AbortCode> {
+        let mut found = Found::NOTHING;
+        self.dictionary.find(at, &mut found)?;
         Ok((found.data_type, found.access))
     }
 
@@ -168,17 +180,18 @@ impl<B: Board, const N: usize> ObjectDictionary for View<'_, B, N> {
     }
 
     fn get(&mut self, at: Address) -> Result<Value, AbortCode> {
-        let found = self.dictionary.find(at)?;
-        let value = self.value(&found)?;
+        let mut found = Found::NOTHING;
+        self.dictionary.find(at, &mut found)?;
+        let value = self.value(at, &found)?;
         Ok(Value::new(found.data_type, value as i64))
     }
 
     fn set(&mut self, at: Address, value: Value) -> Result<(), AbortCode> {
         let dictionary = &mut *self.dictionary;
-        let [a, b, c, d, e, f, ..] = value.padded();
-        // No entry that can be written is signed.
-        let number = u32::from_le_bytes([a, b, c, d]);
-        let found = dictionary.find(at)?;
+        let bytes = u64::from_le_bytes(value.padded());
+        let number = bytes as u32;
+        let mut found = Found::NOTHING;
+        dictionary.find(at, &mut found)?;
         // 80h, all nodes, is not a node-ID.
         let node = found.node;
         let target = node.map_or(Target::All, Target::Node);
@@ -204,11 +217,10 @@ impl<B: Board, const N: usize> ObjectDictionary for View<'_, B, N> {
                 dictionary.may_request(self.board, NodeControl { command, target })?;
                 return dictionary.push(Event::Configure(target));
             }
-            // Whatever is written.
-            Item::Measured => self.board.measure_anew(),
+            Item::Board => return self.board.set_number(at, number),
             Item::TransferTest => return dictionary.set_transfer_word(found.n(), number),
             Item::Clock => {
-                let time = TimeOfDay::decode([a, b, c, d, e, f]);
+                let time = TimeOfDay::of_number(bytes);
                 let time = time.ok_or(AbortCode::VALUE_RANGE)?;
                 dictionary.clock.set(time, self.now);
             }
@@ -219,7 +231,8 @@ impl<B: Board, const N: usize> ObjectDictionary for View<'_, B, N> {
 
     fn read(&mut self, at: Address, offset: u32, buf: &mut [u8]) -> Result<Chunk, AbortCode> {
         let dictionary = &*self.dictionary;
-        let found = dictionary.find(at)?;
+        let mut found = Found::NOTHING;
+        dictionary.find(at, &mut found)?;
         let known = found.node.and_then(|id| dictionary.node(id));
         let description = &dictionary.description;
         let text = match found.item {
@@ -252,8 +265,18 @@ impl<B: Board, const N: usize> ObjectDictionary for View<'_, B, N> {
                 }
                 return Ok(window.chunk());
             }
+            Item::Board => return self.board.read(at, offset, buf),
             _ => return Err(AbortCode::UNSUPPORTED_ACCESS),
         };
         Ok(read_bytes(text.as_bytes(), offset, buf))
+    }
+
+    /// Of the entries without a fixed size only the board's can be written.
+    fn write(&mut self, at: Address, part: Part<'_>) -> Result<(), AbortCode> {
+        self.board.write(at, part)
+    }
+
+    fn cancel(&mut self, at: Address) {
+        self.board.cancel(at);
     }
 }

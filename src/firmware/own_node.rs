@@ -22,6 +22,7 @@ use canmaster::{
     device::{self, Description, Device, Identity, MasterError, Setting, Settings},
     emcy::EmcyCode,
     frame::MAX_DATA,
+    id::Address,
     master::{IMAGE_BYTES, MasterOd, Notice, WrongLength},
     motion::{AxisCommand, FaultCause, GroupEvent, GroupState},
     network::Network,
@@ -104,20 +105,20 @@ where
         allowed.map_err(|_| AbortCode::DEVICE_STATE)
     }
 
-    fn measured(&mut self, sub: u8) -> u32 {
-        measured::entry(sub)
+    fn number(&mut self, at: Address) -> Result<u32, AbortCode> {
+        Ok(measured::entry(at.sub.0))
     }
 
-    fn measure_anew(&mut self) {
+    fn set_number(&mut self, _: Address, _: u32) -> Result<(), AbortCode> {
         measured::anew();
+        Ok(())
     }
 
     fn tpdo(&mut self, node: NodeId, number: u8) -> [u8; 8] {
-        let image = self
-            .network
-            .find(node)
-            .map(|(axis, _)| self.od.lock(|od| *od.image(axis)));
-        pdo(&image.unwrap_or([0; IMAGE_BYTES]), number)
+        match self.network.find(node) {
+            Some((axis, _)) => self.od.lock(|od| pdo(od.image(axis), number)),
+            None => [0; MAX_DATA],
+        }
     }
 
     fn rpdo(&mut self, node: NodeId, number: u8) -> [u8; 8] {
