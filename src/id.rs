@@ -1,36 +1,39 @@
 //! The identifiers of CANopen as types: a value that exists is a valid one.
 
 use crate::words::in_words;
+use core::num::NonZeroU8;
 use embedded_can::StandardId;
 
 /// A node-ID, 1..=127 (CiA 301, 7.2.1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct NodeId(u8);
+pub struct NodeId(NonZeroU8);
 
 impl NodeId {
     /// The lowest node-ID.
-    pub const MIN: NodeId = NodeId(1);
+    pub const MIN: NodeId = NodeId(NonZeroU8::MIN);
     /// The highest node-ID.
-    pub const MAX: NodeId = NodeId(127);
+    pub const MAX: NodeId = NodeId::constant::<127>();
 
     /// `None` unless `id` is in 1..=127.
     pub const fn new(id: u8) -> Option<NodeId> {
-        if id >= 1 && id <= 127 {
-            Some(NodeId(id))
-        } else {
-            None
+        match NonZeroU8::new(id) {
+            Some(number) if id <= 127 => Some(NodeId(number)),
+            _ => None,
         }
     }
 
     /// For tables written down in the source: a wrong number does not compile.
     pub const fn constant<const ID: u8>() -> NodeId {
         const { assert!(ID >= 1 && ID <= 127, "a node-ID is 1..=127") }
-        NodeId(ID)
+        match NonZeroU8::new(ID) {
+            Some(number) => NodeId(number),
+            None => NodeId::MIN,
+        }
     }
 
     /// The number, 1..=127.
     pub const fn get(self) -> u8 {
-        self.0
+        self.0.get()
     }
 }
 

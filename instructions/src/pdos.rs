@@ -6,7 +6,7 @@ use canmaster::NodeId;
 use canmaster::master::{AxisPdos, MasterOd, TPDOS_PER_AXIS, TpdoSlot};
 use canmaster::motion::AxisCommand;
 use canmaster::motion::mode::Mode;
-use canmaster::network::sample::SIX_EPOS4;
+use canmaster::network::sample::SIX_EPOS4_10_MS as SIX_EPOS4;
 
 const AXES: usize = 6;
 const NODE: NodeId = NodeId::constant::<1>();

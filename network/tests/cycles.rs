@@ -6,10 +6,10 @@ use std::path::Path;
 
 use canmaster_network::{Source, read_for_firmware};
 
-/// The sample with other lines; the cycles of its bus. `None`: it is refused.
+/// The 10 ms description with other lines; the cycles of its bus. `None`: it is refused.
 fn cycles(changes: &[(&str, &str)]) -> Option<RangeInclusive<u32>> {
-    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let text = std::fs::read_to_string(workspace.join("network.toml")).unwrap();
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../networks");
+    let text = std::fs::read_to_string(folder.join("one_bus_10ms.toml")).unwrap();
     // The order is the firmware's, and no write to 1006h changes it.
     let order = "load_limit = 90\nrpdos = \"after TPDOs\"";
     let mut text = text.replace("load_limit = 90", order);
@@ -18,7 +18,7 @@ fn cycles(changes: &[(&str, &str)]) -> Option<RangeInclusive<u32>> {
         text = text.replace(from, to);
     }
     let source = Source::new("network.toml", text.as_bytes());
-    let outcome = read_for_firmware(&source, &mut |file| std::fs::read(workspace.join(file)));
+    let outcome = read_for_firmware(&source, &mut |file| std::fs::read(folder.join(file)));
     Some(outcome.machine?.buses[0].cycles())
 }
 
@@ -43,7 +43,7 @@ fn agrees(range: &RangeInclusive<u32>, changes: &[(&str, &str)]) {
 }
 
 #[test]
-fn the_sample_may_go_down_to_its_deadline_and_what_comes_after_it() {
+fn a_cycle_may_go_down_to_its_deadline_and_what_comes_after_it() {
     let range = cycles(&[]).unwrap();
     // Deadline, computation, RPDOs, guard; and what the timer counts.
     assert_eq!(range, 5_000 + 200 + 690 + 135..=65_535);

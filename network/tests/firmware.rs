@@ -1,6 +1,6 @@
 //! What the firmware of this project cannot do is refused, with the line.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use canmaster_network::{Source, read_for_firmware};
 
@@ -11,15 +11,18 @@ fn refused(from: &str, to: &str) -> String {
     words(&sample.replace(from, to))
 }
 
+/// Of 10 ms: it has both TPDOs, and room for more axes.
 fn sample() -> String {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../network.toml");
-    std::fs::read_to_string(path).unwrap()
+    std::fs::read_to_string(folder().join("one_bus_10ms.toml")).unwrap()
+}
+
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../networks")
 }
 
 fn words(text: &str) -> String {
-    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let source = Source::new("network.toml", text.as_bytes());
-    let outcome = read_for_firmware(&source, &mut |file| std::fs::read(workspace.join(file)));
+    let outcome = read_for_firmware(&source, &mut |file| std::fs::read(folder().join(file)));
     assert_eq!(outcome.machine.is_none(), !outcome.problems.is_empty());
     let words: Vec<String> = outcome.problems.iter().map(|p| p.to_string()).collect();
     words.join("\n\n")
@@ -78,8 +81,7 @@ fn an_rpdo_carries_what_the_firmware_writes() {
 fn modes_without_their_rpdo() {
     let modes = |text: &str| {
         let source = Source::new("network.toml", text.as_bytes());
-        let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-        let outcome = read_for_firmware(&source, &mut |file| std::fs::read(workspace.join(file)));
+        let outcome = read_for_firmware(&source, &mut |file| std::fs::read(folder().join(file)));
         outcome.machine.unwrap().nodes[0].motor().unwrap().modes
     };
     let sample = sample();

@@ -57,32 +57,30 @@ fn the_generated_network_is_the_one_of_the_library() {
     assert_eq!(shown(&generated::NETWORK), shown(&SIX_EPOS4));
     assert_eq!(generated::AXES, SIX_EPOS4.nodes.len());
     assert_eq!(generated::MOTORS, [Motor::SAMPLE; generated::AXES]);
-    assert_eq!(generated::TPDO_DEADLINE_US, 5_000);
+    assert_eq!(generated::TPDO_DEADLINE_US, 1_130);
     let program = sample().program.unwrap();
     assert_eq!(generated::PROGRAM[..], program.bytes());
     assert_eq!(generated::TPDO_MISSING_LIMIT, GROUP.missing_tpdo_max);
     // What comes after the deadline at worst still fits.
     const { assert!(generated::SHORTEST_CYCLE_US > generated::TPDO_DEADLINE_US as u32) };
-    assert_eq!((generated::COMPUTE_US, generated::RPDOS_US), (200, 825));
+    assert_eq!((generated::COMPUTE_US, generated::RPDOS_US), (120, 710));
     assert_eq!(generated::LONGEST_CYCLE_US, 65_535);
 }
 
-/// SDO is not planned in the sample, ramps are sent on change.
+/// SDO and ramps share a slot directly after SYNC, and no heartbeat is in operational.
 #[test]
 fn the_generated_cycle_of_the_sample() {
     use generated::*;
-    let bus = &sample().buses[0];
     assert_eq!((BUSES, BUS_PERIPHERALS), (1, [1]));
     assert_eq!(BUS_BIT_TIMINGS, [(1, 20, 3)]);
     assert_eq!(AXIS_BUSES, [0; AXES]);
-    assert_eq!((RPDOS_AFTER_SYNC, GUARD_US), (false, 135));
-    // The shortest SYNC has 47 bits, and nobody knows when the TPDOs come.
-    assert_eq!(AFTER_SYNC_US, [47]);
-    assert_eq!((ONE_PLANNED, SDO_NEXT_CYCLE), ([false], [false]));
-    let until = bus.cycle_us as u16;
-    assert_eq!((SDO_FROM_US, SDO_UNTIL_US, SDO_EVERY), ([0], [until], [0]));
+    assert_eq!((RPDOS_AFTER_SYNC, GUARD_US), (false, 20));
+    // The shortest SYNC has 47 bits, and the first TPDO comes 50 us later.
+    assert_eq!(AFTER_SYNC_US, [97]);
+    assert_eq!((ONE_PLANNED, SDO_NEXT_CYCLE), ([true], [false]));
+    assert_eq!((SDO_FROM_US, SDO_UNTIL_US, SDO_EVERY), ([0], [97], [0]));
     assert_eq!(RAMPS_ON_CHANGE, [true; AXES]);
-    assert_eq!(HEARTBEATS_IN_OPERATIONAL, [true; AXES]);
+    assert_eq!(HEARTBEATS_IN_OPERATIONAL, [false; AXES]);
 }
 
 #[test]

@@ -2,6 +2,8 @@
 //! (CiA 302-2), with the firmware image: to standby, never to motion.
 
 mod common;
+#[path = "common/ten_ms.rs"]
+mod ten_ms;
 
 use canmaster::id::Address;
 use canmaster::sdo::Protocol;
@@ -12,7 +14,7 @@ use canmaster_sim::frame::{WireFrame, WireId};
 use canmaster_sim::judge::STANDSTILL_RPM;
 use canmaster_sim::time::Time;
 use canmaster_sim::world::trials::moving;
-use canmaster_sim::world::{Client, Scenario, Stimulus, World, enabled, operational};
+use canmaster_sim::world::{Client, Image, Scenario, Stimulus, World, enabled, operational};
 
 use common::image;
 
@@ -124,7 +126,11 @@ fn spoil(world: &mut World<'_>, identifier: u16) {
 /// A client of the board, which is in pre-operational and awaits the boot-up
 /// frames.
 fn awake(scenario: Scenario) -> Client<'static> {
-    let world = World::new(image(), scenario.unattended()).unwrap();
+    awake_of(image(), scenario)
+}
+
+fn awake_of(image: &'static Image, scenario: Scenario) -> Client<'static> {
+    let world = World::new(image, scenario.unattended()).unwrap();
     let mut client = Client::new(world, MASTER);
     client.listen(Time::from_ms(700));
     client
@@ -360,7 +366,8 @@ fn without_bit_1_of_1f80h_nodes_are_started_one_by_one() {
 
 #[test]
 fn a_drive_to_be_kept_alive_is_left_running_by_a_reset_of_the_board() {
-    let mut client = awake(Scenario::new(62, Time::MAX));
+    // Nobody but its heartbeat tells that it is operational already.
+    let mut client = awake_of(ten_ms::image(), Scenario::new(62, Time::MAX));
     let bits = MANDATORY | KEEP_ALIVE;
     client.put(SLAVE_ASSIGNMENT, NODE.get(), bits, 4).unwrap();
     let save = Address::new(0x1010, 1);

@@ -3,6 +3,8 @@
 //! pressed; the reason names who and what.
 
 mod common;
+#[path = "common/ten_ms.rs"]
+mod ten_ms;
 
 use canmaster::emcy::{Emcy, EmcyCode, ErrorRegister};
 use canmaster::nmt::{Command, NodeControl};
@@ -13,7 +15,7 @@ use canmaster_sim::drive::{DriveFault, cia402};
 use canmaster_sim::judge::{Outcome, STANDSTILL_RPM};
 use canmaster_sim::time::Time;
 use canmaster_sim::world::trials::{moving, spin_in_motion};
-use canmaster_sim::world::{Record, Stimulus, World, sample};
+use canmaster_sim::world::{Image, Record, Stimulus, World, sample};
 
 use common::image;
 
@@ -28,7 +30,17 @@ const WATCHED: Time = Time::from_ms(700);
 /// Does `harm` while all axes move and watches what comes of it. Every axis but
 /// that of `spared`, which may coast, is at rest in time; all are in the end.
 fn struck(seed: u64, spared: Option<NodeId>, harm: impl FnOnce(&mut World<'_>)) -> Record {
-    let mut world = moving(image(), seed).unwrap().with_guest();
+    struck_of(image(), seed, spared, harm)
+}
+
+/// The same on the machine that `image` is for.
+fn struck_of(
+    image: &Image,
+    seed: u64,
+    spared: Option<NodeId>,
+    harm: impl FnOnce(&mut World<'_>),
+) -> Record {
+    let mut world = moving(image, seed).unwrap().with_guest();
     let struck = world.now();
     harm(&mut world);
     world.run_to(struck + STOPPED_BY, World::at_rest);
@@ -140,7 +152,7 @@ fn an_emergency_of_unknown_meaning_is_a_fault() {
 
 #[test]
 fn a_lost_heartbeat_stops_all_although_process_data_go_on() {
-    let record = struck(34, None, |world| {
+    let record = struck_of(ten_ms::image(), 34, None, |world| {
         let at = world.now();
         let fault = DriveFault::HeartbeatLost { at };
         world.apply(Stimulus::Drive { node: NODE, fault });
@@ -163,12 +175,18 @@ fn after_a_power_cycle_of_a_drive_nothing_moves_by_itself() {
 
 #[test]
 fn another_master_that_stops_a_node_stops_all() {
-    let record = struck(36, None, |world| {
-        let node = NodeId::constant::<2>();
-        say(world, NodeControl::node(Command::Stop, node).frame());
-    });
-    assert_failed(&record, &["node 2"]);
-    assert_logged(&record, "node 2: went to NMT");
+    // Its heartbeat says so; without one its TPDOs are missing.
+    for (image, words) in [
+        (ten_ms::image(), "node 2: went to NMT"),
+        (image(), "node 2 (axis 2): no TPDO"),
+    ] {
+        let record = struck_of(image, 36, None, |world| {
+            let node = NodeId::constant::<2>();
+            say(world, NodeControl::node(Command::Stop, node).frame());
+        });
+        assert_failed(&record, &["node 2"]);
+        assert_logged(&record, words);
+    }
 }
 
 #[test]

@@ -2,6 +2,8 @@
 //! object dictionary while the master runs the network, and commands it.
 
 mod common;
+#[path = "common/ten_ms.rs"]
+mod ten_ms;
 
 use canmaster::id::Address;
 use canmaster::nmt::{Command, NodeControl};
@@ -10,7 +12,7 @@ use canmaster::{CobId, Frame, NodeId};
 use canmaster_sim::board::irqs;
 use canmaster_sim::drive::DriveFault;
 use canmaster_sim::time::Time;
-use canmaster_sim::world::{Client, Scenario, Stimulus, World, enabled};
+use canmaster_sim::world::{Client, Image, Scenario, Stimulus, World, enabled};
 
 use common::image;
 
@@ -26,13 +28,20 @@ const STOPPED: u8 = 0x04;
 const CONFIGURE: u32 = u32::from_le_bytes(*b"conf");
 
 fn client(scenario: Scenario) -> Client<'static> {
-    let world = World::new(image(), scenario.unattended()).unwrap();
+    client_of(image(), scenario)
+}
+
+fn client_of(image: &'static Image, scenario: Scenario) -> Client<'static> {
+    let world = World::new(image, scenario.unattended()).unwrap();
     Client::new(world, MASTER)
 }
 
 /// A client beside a master in standby.
 fn in_standby(seed: u64) -> Client<'static> {
-    let mut client = client(Scenario::new(seed, END));
+    standing_by(client(Scenario::new(seed, END)))
+}
+
+fn standing_by(mut client: Client<'static>) -> Client<'static> {
     assert!(client.world.run_to(Time::from_ms(4000), all_enabled));
     client.take_heard();
     client
@@ -253,7 +262,7 @@ fn a_board_that_is_not_the_nmt_master_lives_under_another() {
 #[test]
 fn a_lost_heartbeat_does_to_the_board_what_1029h_says() {
     for (behaviour, code) in [(0, 0x7F), (1, 0x05), (2, 0x04)] {
-        let mut client = in_standby(38);
+        let mut client = standing_by(client_of(ten_ms::image(), Scenario::new(38, END)));
         client.put(0x1029, 1, behaviour, 1).unwrap();
         let at = client.world.now();
         client.world.apply(Stimulus::Drive {
@@ -291,24 +300,24 @@ fn pdos_of_wrong_length_are_told() {
     let mut client = alone(40);
     client.take_heard();
     for (len, code) in [(5, 0x10), (8, 0x20)] {
-        let frame = Frame::data_frame(CobId::new(0x284).unwrap(), &[7; 8][..len]).unwrap();
+        let frame = Frame::data_frame(CobId::new(0x184).unwrap(), &[7; 8][..len]).unwrap();
         client.say(frame);
         client.listen(Time::from_ms(1100));
         let told = client.heard_from(EMCY);
-        // 8210h or 8220h: node 4, TPDO2; over as soon as it is told.
+        // 8210h or 8220h: node 4, TPDO1; over as soon as it is told.
         assert!(
-            told.contains(&vec![code, 0x82, 0x11, 4, 2, 0, 0, 0]),
+            told.contains(&vec![code, 0x82, 0x11, 4, 1, 0, 0, 0]),
             "{len} bytes: {told:02X?}"
         );
     }
     let field: Vec<u32> = (1..=8)
         .filter_map(|sub| client.number(0x1003, sub).ok())
         .collect();
-    for error in [0x0204_8210, 0x0204_8220] {
+    for error in [0x0104_8210, 0x0104_8220] {
         assert!(field.contains(&error), "{field:08X?}");
     }
     // What was too short was left, what was too long was taken.
-    assert_eq!(client.number(0x3004, 3).unwrap(), 0x0707_0707);
+    assert_eq!(client.number(0x3004, 2).unwrap(), 0x0707_0707);
 }
 
 /// CiA 301, 7.5.2.5 .. 7.5.2.7, 7.5.2.22.
@@ -323,7 +332,8 @@ fn the_sync_follows_1005h_1006h_and_1019h_in_pre_operational() {
     for us in [shortest, longest, 10_000] {
         put(&mut client, us).unwrap();
     }
-    refused(client.put(0x1007, 0, 5_000, 4), AbortCode::VALUE_TOO_LOW);
+    // The deadline of the TPDOs, the step of the axes, the RPDOs and the guard.
+    refused(client.put(0x1007, 0, 1_959, 4), AbortCode::VALUE_TOO_LOW);
     refused(client.put(0x1007, 0, 10_001, 4), AbortCode::VALUE_TOO_HIGH);
     refused(client.put(0x1019, 0, 3, 1), AbortCode::DEVICE_STATE);
     client.put(0x1006, 0, 0, 4).unwrap();
@@ -355,13 +365,14 @@ fn the_sync_follows_1005h_1006h_and_1019h_in_pre_operational() {
 #[test]
 fn synchronous_pdos_keep_to_the_window_of_1007h() {
     const WINDOW: Time = Time::from_us(7_500);
-    let mut client = alone(43);
+    let mut client = client_of(ten_ms::image(), Scenario::new(43, END).without_drives());
+    client.listen(AWAKE);
     client.put(0x1007, 0, 7_500, 4).unwrap();
     client
         .write(at(0x1010, 1), b"save", Protocol::Normal)
         .unwrap();
     let stored = client.world.board().bank2();
-    let mut client = self::client(Scenario::new(44, END).stored(stored));
+    let mut client = client_of(ten_ms::image(), Scenario::new(44, END).stored(stored));
     assert!(client.world.run_to(Time::from_ms(4000), all_enabled));
     // A TPDO is missing, so that the deadline makes the cycle, and it is late:
     // past the window in a good part of the cycles.

@@ -2,6 +2,8 @@
 //! --faults` does with 200 seeds.
 
 mod common;
+#[path = "common/ten_ms.rs"]
+mod ten_ms;
 
 use canmaster_sim::world::strike::Strike;
 
@@ -17,7 +19,11 @@ fn the_contract_for_faults_holds_whatever_happens() {
     let axes = image().machine().network().nodes.len();
     for seed in SEEDS {
         let strike = Strike::random(seed, axes);
-        let struck = strike.run(image(), seed);
+        let image = match strike.wants_heartbeats() {
+            true => ten_ms::image(),
+            false => image(),
+        };
+        let struck = strike.run(image, seed);
         assert!(
             struck.is_ok(),
             "seed {seed}, {strike:?}: {}",

@@ -111,7 +111,7 @@ fn one_that_drops_out_is_named() {
     ] {
         fails(
             state,
-            Trouble::DropsOut { after_us: 4000 },
+            Trouble::DropsOut { after_us: 1500 },
             &["ERROR node 4"],
         );
     }

@@ -1,6 +1,7 @@
 //! The dictionary itself: the values and the state behind its entries.
 
 use super::node_record::{NodeRecord, NodeStatus, Presence};
+use super::own_tpdo::OwnTpdos;
 use super::settings::{Setting, Settings, nodes};
 use super::transfer::TransferTest;
 use super::{Board, Description, Event};
@@ -33,6 +34,7 @@ pub(super) struct Dictionary<const N: usize> {
     pub(super) nodes: [NodeRecord; N],
     /// 2F12h
     pub(super) transfer: TransferTest,
+    pub(super) own_tpdos: OwnTpdos,
     pub(super) events: Deque<Event, EVENTS>,
 }
 
@@ -132,6 +134,7 @@ impl<const N: usize> Dictionary<N> {
     }
 
     /// Takes note of a step of the boot-up.
+    #[inline(never)]
     pub(super) fn on_boot_event(&mut self, event: &boot::Event) {
         let Some(status) = NodeStatus::after(event) else {
             return;
@@ -150,9 +153,9 @@ impl<const N: usize> Dictionary<N> {
         // A node that was never heard counts as lost when its boot time is over.
         if let boot::Event::Failed(_, failure) = event
             && failure.cause == boot::Cause::NoBootUp
-            && record.presence == Presence::Unknown
+            && record.presence == Presence::UNKNOWN
         {
-            record.presence = Presence::Missing;
+            record.presence = Presence::MISSING;
         }
     }
 }

@@ -67,6 +67,7 @@ impl MasterError {
 
     /// The emergency that reports it, with the bits of the error register that
     /// it sets.
+    #[inline(never)]
     pub const fn emcy(self) -> Emcy {
         const NOBODY: [u8; 3] = [0; 3];
         let (code, [a, b, c]) = match self {

@@ -1,15 +1,17 @@
 //! From index and sub-index to what stands behind them.
 
 use super::dictionary::Dictionary;
+use super::own_tpdo;
 use super::pdo::{Mirrored, Process};
 use super::settings::{Setting, nodes};
-use super::table::{Item, Row, TABLE};
+use super::table::{EACH_NODE, Item, Row, TABLE};
 use crate::id::{Address, NodeId};
 use crate::od::{Access, DataType, Entry};
 use crate::sdo::AbortCode;
 
-/// An entry, and what its value comes from.
-#[derive(Clone, Copy)]
+/// An entry, and what its value comes from. Filled in where it stands: a copy of it
+/// takes more flash than anything that is done with it.
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Found {
     pub(super) item: Item,
     pub(super) data_type: DataType,
@@ -17,12 +19,22 @@ pub(super) struct Found {
     pub(super) sub: u8,
     /// Of the object in its row of the table.
     pub(super) place: u16,
+    pub(super) at: u16,
     /// The node that the entry is about, if sub-index or index tell one.
     pub(super) node: Option<NodeId>,
-    pub(super) at: u16,
 }
 
 impl Found {
+    pub(super) const NOTHING: Found = Found {
+        item: Item::Zero,
+        data_type: DataType::Unsigned8,
+        access: Access::Constant,
+        sub: 0,
+        place: 0,
+        at: 0,
+        node: None,
+    };
+
     /// Where in a record without gaps it is, counted from 0.
     pub(super) fn n(&self) -> usize {
         usize::from(self.sub).wrapping_sub(1)
@@ -30,92 +42,65 @@ impl Found {
 }
 
 impl<const N: usize> Dictionary<N> {
-    pub(super) fn find(&self, at: Address) -> Result<Found, AbortCode> {
+    pub(super) fn find(&self, at: Address, found: &mut Found) -> Result<(), AbortCode> {
         let (at, sub) = (at.index.0, at.sub.0);
         let mut highest = None;
         for row in &TABLE {
             let Some(place) = row.place(at) else { continue };
-            let node = NodeId::new(match row.item {
+            let node = match row.item {
                 Item::EmcyCount | Item::EmcyHistory | Item::Process => place as u8,
                 _ => sub,
-            });
-            let mut found = Found {
-                node,
+            };
+            *found = Found {
                 item: row.item,
                 data_type: row.data_type,
                 access: row.access,
                 sub,
                 place,
                 at,
+                node: NodeId::new(node),
             };
-            let Some(last) = self.last_sub(row, &found) else {
+            let Some(last) = self.last_sub(row, found) else {
                 continue;
             };
             if (row.sub..=last).contains(&sub) {
-                self.refine(&mut found);
-                return Ok(found);
+                return Ok(());
             }
             highest = Some(last);
         }
-        match highest {
-            None => Err(AbortCode::NO_SUCH_OBJECT),
-            Some(last) if sub == 0 => Ok(Found {
-                item: Item::Highest,
-                data_type: DataType::Unsigned8,
-                access: Access::Constant,
-                sub: last,
-                place: 0,
-                node: None,
-                at,
-            }),
-            Some(_) => Err(AbortCode::NO_SUCH_SUB_INDEX),
+        let last = highest.ok_or(AbortCode::NO_SUCH_OBJECT)?;
+        if sub != 0 {
+            return Err(AbortCode::NO_SUCH_SUB_INDEX);
         }
+        *found = Found {
+            item: Item::Highest,
+            sub: last,
+            ..Found::NOTHING
+        };
+        Ok(())
     }
 
     pub(super) fn entry(&self, at: Address) -> Result<Entry, AbortCode> {
-        let found = self.find(at)?;
+        let mut found = Found::NOTHING;
+        self.find(at, &mut found)?;
         Ok(Entry::new(found.data_type, found.access))
     }
 
     /// The last entry of this row that the object has; `None` if there is no such
-    /// object.
-    fn last_sub(&self, row: &Row, found: &Found) -> Option<u8> {
+    /// object. Completes what the table cannot say of the entry, if that exists.
+    #[inline(never)]
+    fn last_sub(&self, row: &Row, found: &mut Found) -> Option<u8> {
         let network = self.network;
-        let last = row.last_sub;
-        match found.item {
-            Item::Setting(Setting::ConsumerHeartbeat(_)) => Some(nodes::<N>(network)),
-            Item::SdoClient | Item::SdoClientNode => {
-                network.nodes.get(usize::from(found.place))?;
-                Some(last)
-            }
-            Item::PdoCobId | Item::PdoTransmission | Item::PdoMapping => {
-                let pdo = Mirrored::find(network, found.at)?.pdo;
-                Some(match found.item {
-                    Item::PdoMapping => pdo.mapping.len() as u8,
-                    _ => last,
-                })
-            }
-            Item::EmcyCount | Item::EmcyHistory | Item::Process => {
-                let (node, _) = self.node(found.node?)?;
-                Some(match found.item {
-                    Item::Process => Process::count(node),
-                    _ => last,
-                })
-            }
-            _ => Some(last),
-        }
-    }
-
-    /// What the table cannot say of an entry that exists.
-    fn refine(&self, found: &mut Found) {
+        let nodes = nodes::<N>(network);
+        let mut last = row.last_sub;
         match found.item {
             Item::Setting(Setting::ConsumerHeartbeat(_)) => {
                 found.item = Item::Setting(Setting::ConsumerHeartbeat(found.n() as u8));
             }
             Item::Setting(Setting::Assignment(_)) => {
-                let place = found.node.and_then(|node| self.network.find(node));
+                let place = found.node.and_then(|node| network.find(node));
                 match place {
-                    Some((place, _)) if place < usize::from(nodes::<N>(self.network)) => {
+                    Some((place, _)) if place < usize::from(nodes) => {
                         found.item = Item::Setting(Setting::Assignment(place as u8));
                     }
                     _ => {
@@ -124,15 +109,39 @@ impl<const N: usize> Dictionary<N> {
                     }
                 }
             }
-            Item::Process => {
-                if let Some(process) = self.process(found) {
-                    found.data_type = process.data_type();
+            Item::SdoClient | Item::SdoClientNode => {
+                network.nodes.get(usize::from(found.place))?;
+            }
+            Item::PdoCobId | Item::PdoTransmission | Item::PdoMapping => {
+                let pdo = Mirrored::find(network, found.at)?.pdo;
+                if found.item == Item::PdoMapping {
+                    last = pdo.mapping.len() as u8;
+                }
+            }
+            Item::OwnTpdo | Item::OwnMapping => {
+                let axes = usize::from(nodes);
+                own_tpdo::mapped(found.place, 1, axes)?;
+                if found.item == Item::OwnMapping
+                    && own_tpdo::mapped(found.place, last, axes).is_none()
+                {
+                    last -= 1;
+                }
+            }
+            Item::EmcyCount | Item::EmcyHistory | Item::Process => {
+                let (node, _) = self.node(found.node?)?;
+                if found.item == Item::Process {
+                    if let Some(process) = Process::find(node, found.sub) {
+                        found.data_type = process.data_type();
+                    }
+                    last = Process::count(node);
                 }
             }
             _ => {}
         }
+        Some(if last == EACH_NODE { nodes } else { last })
     }
 
+    #[inline(never)]
     pub(super) fn process(&self, found: &Found) -> Option<Process> {
         let (node, _) = self.node(found.node?)?;
         Process::find(node, found.sub)

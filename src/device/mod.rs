@@ -11,12 +11,14 @@
 //! | 1014h .. 1017h | emergencies, heartbeats | rw |
 //! | 1020h, 1029h | verify configuration, error behaviour | rw |
 //! | 1028h, 1200h, 1280h .. | emergency consumer, SDO server and clients | const |
-//! | 1400h .. 1A00h .. | the mirror of the nodes' PDOs | const |
+//! | 1400h .., 1600h .., 1804h .., 1A04h .. | the mirror of the nodes' PDOs | const |
+//! | 1800h .. 1803h, 1A00h .. 1A03h | TPDOs of the device's own: off until bit 31 of the COB-ID is cleared; the transmission type, the number of SYNCs between two, is not less than the cycle has room for. Neither is saved by 1010h | rw, mapping const |
 //! | 1F22h | concise DCF of each node, as it is written to it | const |
 //! | 1F25h | "conf": configure a node again | wo |
 //! | 1F26h, 1F27h, 1F84h .. 1F88h, 1F8Ah | what each node has to be | const |
 //! | 1F80h, 1F81h, 1F89h | NMT start-up, slave assignment, boot time | rw |
 //! | 1F82h | request NMT; reads what the node last said; of the device itself 08000022h while an axis is enabled | rw |
+//! | 2000h .. 2010h | the group of axes: see [`Panel`](crate::motion::panel::Panel) | |
 //! | 2F00h:n | error status of the boot-up of node n: a letter of CiA 302-2, 0 for none | ro, U8 |
 //! | 2F01h:n | boot-up of node n in words | ro, string |
 //! | 2F02h:n | newest emergency of node n in words | ro, string |
@@ -34,6 +36,7 @@ mod error;
 mod index;
 mod lookup;
 mod node_record;
+mod own_tpdo;
 mod pdo;
 mod settings;
 mod table;
@@ -52,13 +55,14 @@ use crate::frame::{Frame, MAX_DATA};
 use crate::id::{Address, NodeId};
 use crate::network::Network;
 use crate::nmt::{NodeControl, Service, State, Target};
-use crate::od::Entry;
+use crate::od::{Chunk, Entry, Part};
 use crate::sdo::{AbortCode, Server};
 use crate::sync::SyncLimits;
 use crate::time::{Duration, Instant};
 use crate::time_of_day::{self, TimeOfDay};
 use dictionary::Dictionary;
 use node_record::Presence;
+use own_tpdo::OwnTpdos;
 use view::View;
 
 /// What the board is called.
@@ -76,6 +80,9 @@ pub struct Description {
     pub identity: Identity,
     /// What the device can do of 1006h and 1007h.
     pub sync: SyncLimits,
+    /// The least transmission type that the cycle has room for in the device's own
+    /// TPDOs: SYNCs from one to the next, while all four are sent.
+    pub tpdo_every: u8,
 }
 
 /// The identity object, 1018h (CiA 301, 7.5.2.21).
@@ -111,13 +118,48 @@ pub trait Board {
     /// What the client is told: 08000022h if it would not.
     fn may_request(&mut self, control: NodeControl) -> Result<(), AbortCode>;
 
-    /// The entry `sub` of 2F20h: what the board measures of itself.
-    fn measured(&mut self, _sub: u8) -> u32 {
-        0
+    /// The value of an entry that the board answers for; 2F20h: what it measures of
+    /// itself. Of a signed entry the bits.
+    ///
+    /// # Errors
+    /// What the client is told.
+    fn number(&mut self, at: Address) -> Result<u32, AbortCode> {
+        let _ = at;
+        Ok(0)
     }
 
-    /// 2F20h was written to: what it holds begins anew.
-    fn measure_anew(&mut self) {}
+    /// An entry that the board answers for was written to; 2F20h: what it holds begins
+    /// anew.
+    ///
+    /// # Errors
+    /// What the client is told.
+    fn set_number(&mut self, at: Address, value: u32) -> Result<(), AbortCode> {
+        let _ = (at, value);
+        Ok(())
+    }
+
+    /// As [`ObjectDictionary::read`](crate::od::ObjectDictionary::read), of an entry that the board answers for.
+    ///
+    /// # Errors
+    /// 06010000h unless implemented.
+    fn read(&mut self, at: Address, offset: u32, buf: &mut [u8]) -> Result<Chunk, AbortCode> {
+        let _ = (at, offset, buf);
+        Err(AbortCode::UNSUPPORTED_ACCESS)
+    }
+
+    /// As [`ObjectDictionary::write`](crate::od::ObjectDictionary::write), of an entry that the board answers for.
+    ///
+    /// # Errors
+    /// 06010000h unless implemented.
+    fn write(&mut self, at: Address, part: Part<'_>) -> Result<(), AbortCode> {
+        let _ = (at, part);
+        Err(AbortCode::UNSUPPORTED_ACCESS)
+    }
+
+    /// As [`ObjectDictionary::cancel`](crate::od::ObjectDictionary::cancel), of an entry that the board answers for.
+    fn cancel(&mut self, at: Address) {
+        let _ = at;
+    }
 
     /// The bytes of a TPDO of a node as it last came, zeros before.
     fn tpdo(&mut self, node: NodeId, number: u8) -> [u8; MAX_DATA];
@@ -174,6 +216,7 @@ impl<const N: usize> Device<N> {
                 clock: time_of_day::Clock::new(),
                 nodes: core::array::from_fn(|_| Default::default()),
                 transfer: TransferTest::NONE,
+                own_tpdos: OwnTpdos::new(description.tpdo_every),
                 events: heapless::Deque::new(),
             },
             time: time_of_day::Producer::new(),
@@ -212,11 +255,7 @@ impl<const N: usize> Device<N> {
     pub fn set_state(&mut self, state: State, board: &mut impl Board, now: Instant) {
         self.dictionary.state = state;
         if !state.allows(Service::Sdo) {
-            let view = &mut View {
-                dictionary: &mut self.dictionary,
-                board,
-                now,
-            };
+            let view = &mut View::new(&mut self.dictionary, board, now);
             self.server.reset(view);
         }
     }
@@ -241,6 +280,19 @@ impl<const N: usize> Device<N> {
         &mut self.dictionary.transfer
     }
 
+    /// SYNCs have been sent: own TPDOs may be due, which [`poll`](Self::poll) makes.
+    pub fn on_syncs(&mut self, count: u32) {
+        for _ in 0..count {
+            self.dictionary.own_tpdos.on_sync();
+        }
+    }
+
+    /// Whether any of the device's own TPDOs is switched on: then it has to be told of
+    /// SYNCs in time.
+    pub const fn sends_tpdos(&self) -> bool {
+        self.dictionary.own_tpdos.any()
+    }
+
     /// Takes note of a step of the boot-up: 2F00h, 2F01h.
     pub fn on_boot_event(&mut self, event: &boot::Event) {
         self.dictionary.on_boot_event(event);
@@ -257,7 +309,7 @@ impl<const N: usize> Device<N> {
     /// lost.
     pub fn on_node_state(&mut self, node: NodeId, state: Option<State>) {
         if let Some(record) = self.dictionary.record(node) {
-            record.presence = state.map_or(Presence::Missing, Presence::State);
+            record.presence = state.map_or(Presence::MISSING, Presence::state);
         }
     }
 
@@ -305,6 +357,7 @@ impl<const N: usize> Device<N> {
 
     /// Takes in a frame: a request to the SDO server, answered unless the NMT
     /// state forbids it, or TIME.
+    #[inline(never)]
     pub fn on_frame(
         &mut self,
         frame: &Frame,
@@ -319,11 +372,7 @@ impl<const N: usize> Device<N> {
             return None;
         }
         let before = self.time_period();
-        let view = &mut View {
-            dictionary: &mut self.dictionary,
-            board,
-            now,
-        };
+        let view = &mut View::new(&mut self.dictionary, board, now);
         let answer = self.server.on_frame(frame, now, view);
         if self.time_period() != before {
             self.start_time(now);
@@ -333,6 +382,7 @@ impl<const N: usize> Device<N> {
 
     /// Lets time pass: to be called until it returns `None`, or until there is
     /// no room for another frame.
+    #[inline(never)]
     pub fn poll(&mut self, now: Instant, board: &mut impl Board) -> Option<Frame> {
         let dictionary = &mut self.dictionary;
         dictionary.clock.advance(now);
@@ -352,12 +402,10 @@ impl<const N: usize> Device<N> {
         {
             return Some(time);
         }
-        let view = &mut View {
-            dictionary,
-            board,
-            now,
-        };
-        self.server.poll(now, view)
+        let pdos = dictionary.state.allows(Service::Pdo);
+        let view = &mut View::new(dictionary, board, now);
+        let tpdo = if pdos { view.own_tpdo() } else { None };
+        tpdo.or_else(|| self.server.poll(now, view))
     }
 
     /// When [`poll`](Self::poll) has something to do, if the NMT state allows

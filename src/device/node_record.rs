@@ -149,25 +149,18 @@ pub(super) struct NodeRecord {
     pub(super) emcy: History<Emcy, HISTORY>,
 }
 
-/// Whether error control hears the node.
+/// What error control hears of the node, as 1F82h has it (CiA 302-2).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) enum Presence {
-    /// It was never heard.
-    #[default]
-    Unknown,
-    /// It was heard and is not any more, or not in its boot time.
-    Missing,
-    /// What it last said.
-    State(State),
-}
+pub(super) struct Presence(pub(super) u8);
 
 impl Presence {
-    /// As 1F82h has it (CiA 302-2).
-    pub(super) const fn code(self) -> u8 {
-        match self {
-            Presence::Unknown => 0,
-            Presence::Missing => 1,
-            Presence::State(state) => state.code(),
-        }
+    /// It was never heard.
+    pub(super) const UNKNOWN: Presence = Presence(0);
+    /// It was heard and is not any more, or not in its boot time.
+    pub(super) const MISSING: Presence = Presence(1);
+
+    /// What it last said.
+    pub(super) const fn state(state: State) -> Presence {
+        Presence(state.code())
     }
 }

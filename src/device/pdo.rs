@@ -2,11 +2,12 @@
 //! the nodes, and what they carry.
 //!
 //! The TPDOs of the nodes, in the order of the network, are the master's RPDOs,
-//! and the other way round. They are mapped to the process image: record
+//! and the other way round, behind the TPDOs of its own. They are mapped to the process image: record
 //! 3000h + node-ID holds first the objects that the node sends, then those that
 //! it receives.
 
 use super::index;
+use super::own_tpdo::OWN_TPDOS;
 use crate::id::NodeId;
 use crate::network::{self, Network, Node, Pdo};
 use crate::od::DataType;
@@ -33,7 +34,11 @@ impl Mirrored {
         } else {
             Direction::Receive
         };
-        let mut number = usize::from(at % BLOCK);
+        let before = match direction {
+            Direction::Transmit => 0,
+            Direction::Receive => OWN_TPDOS,
+        };
+        let mut number = usize::from((at % BLOCK).checked_sub(before)?);
         for node in network.nodes {
             let pdos = pdos(node, direction);
             if let Some(pdo) = pdos.get(number) {

@@ -6,9 +6,11 @@
 
 use super::index;
 use super::node_record::HISTORY;
+use super::own_tpdo::OWN_TPDOS;
 use super::settings::Setting;
 use crate::emcy::ERROR_FIELD;
 use crate::id::NodeId;
+use crate::motion::panel;
 use crate::od::{Access, DataType};
 
 /// Where the value of an entry comes from.
@@ -37,6 +39,9 @@ pub(super) enum Item {
     PdoCobId,
     PdoTransmission,
     PdoMapping,
+    /// Parameters of the board's own TPDOs.
+    OwnTpdo,
+    OwnMapping,
     ConciseDcf,
     Configure,
     /// Not named by the network: 0.
@@ -52,7 +57,8 @@ pub(super) enum Item {
     EmcyWords,
     Clock,
     TransferTest,
-    Measured,
+    /// What the board answers for: [`Board::number`](super::Board::number).
+    Board,
     EmcyCount,
     EmcyHistory,
     Process,
@@ -106,6 +112,11 @@ impl Row {
         Row::variable(at, data_type, Access::ReadWrite, Item::Setting(setting))
     }
 
+    /// An array over the nodes, by their places in the network.
+    const fn each_node(at: u16, data_type: DataType, access: Access, item: Item) -> Row {
+        Row::array(at, (1, EACH_NODE), data_type, access, item)
+    }
+
     /// The same for the objects up to `last`.
     const fn up_to(self, last: u16) -> Row {
         Row {
@@ -117,6 +128,8 @@ impl Row {
 
 /// The sub-index that means all nodes.
 pub(super) const ALL: u8 = 0x80;
+/// The last sub-index of an array over the nodes: how many there are.
+pub(super) const EACH_NODE: u8 = u8::MAX;
 /// An array whose sub-index is the node-ID.
 const NODES: (u8, u8) = (1, NodeId::MAX.get());
 /// The most objects that the 64 bits of a PDO hold.
@@ -124,13 +137,23 @@ const MAPPED: u8 = 64;
 /// Objects of one kind of PDO parameters.
 const PDOS: u16 = 0x1FF;
 
-pub(super) static TABLE: [Row; 56] = {
+pub(super) static TABLE: [Row; 72] = {
     use Access::{Constant, ReadOnly, ReadWrite, WriteOnly};
     use DataType::{
-        Domain, TimeOfDay, Unsigned8, Unsigned16, Unsigned32, Unsigned64, VisibleString,
+        Domain, Integer8, Integer32, TimeOfDay, Unsigned8, Unsigned16, Unsigned32, Unsigned64,
+        VisibleString,
     };
     const fn pdo(first: u16, subs: (u8, u8), data_type: DataType, item: Item) -> Row {
         Row::array(first, subs, data_type, Constant, item).up_to(first + PDOS)
+    }
+    const fn own_tpdo(
+        first: u16,
+        subs: (u8, u8),
+        data_type: DataType,
+        access: Access,
+        item: Item,
+    ) -> Row {
+        Row::array(first, subs, data_type, access, item).up_to(first + OWN_TPDOS - 1)
     }
     const fn transfer_test(subs: (u8, u8), access: Access) -> Row {
         let at = index::TRANSFER_TEST;
@@ -195,7 +218,7 @@ pub(super) static TABLE: [Row; 56] = {
         Row::setting(index::COB_ID_TIME, Unsigned32, Setting::TimeCobId),
         Row::setting(index::COB_ID_EMCY, Unsigned32, Setting::EmcyCobId),
         Row::setting(index::EMCY_INHIBIT, Unsigned16, Setting::EmcyInhibit),
-        node(
+        Row::each_node(
             index::CONSUMER_HEARTBEAT,
             Unsigned32,
             ReadWrite,
@@ -272,6 +295,15 @@ pub(super) static TABLE: [Row; 56] = {
             Unsigned32,
             Item::PdoMapping,
         ),
+        own_tpdo(index::TPDO, (1, 1), Unsigned32, ReadWrite, Item::OwnTpdo),
+        own_tpdo(index::TPDO, (2, 2), Unsigned8, ReadWrite, Item::OwnTpdo),
+        own_tpdo(
+            index::TPDO_MAPPING,
+            (1, 2),
+            Unsigned32,
+            Constant,
+            Item::OwnMapping,
+        ),
         pdo(index::TPDO, (1, 1), Unsigned32, Item::PdoCobId),
         pdo(index::TPDO, (2, 2), Unsigned8, Item::PdoTransmission),
         pdo(
@@ -319,6 +351,21 @@ pub(super) static TABLE: [Row; 56] = {
             Constant,
             Item::RestoreConfiguration,
         ),
+        Row::variable(panel::COMMAND, Unsigned16, ReadWrite, Item::Board),
+        Row::variable(panel::STATE, Unsigned8, ReadOnly, Item::Board),
+        Row::variable(panel::REFUSAL, Unsigned32, ReadOnly, Item::Board),
+        Row::variable(panel::AXES, Unsigned32, ReadWrite, Item::Board),
+        Row::each_node(panel::TARGET, Integer32, ReadWrite, Item::Board),
+        Row::each_node(panel::VELOCITY, Unsigned32, ReadWrite, Item::Board)
+            .up_to(panel::ACCELERATION),
+        Row::variable(panel::JERK, Unsigned32, ReadWrite, Item::Board),
+        Row::each_node(panel::MODE, Integer8, ReadWrite, Item::Board),
+        Row::each_node(panel::POSITION, Integer32, ReadOnly, Item::Board)
+            .up_to(panel::FOLLOWING_ERROR),
+        Row::each_node(panel::STATUSWORD, Unsigned16, ReadOnly, Item::Board),
+        Row::each_node(panel::FAULT, Unsigned32, ReadOnly, Item::Board),
+        Row::variable(panel::PROGRAM, Domain, ReadWrite, Item::Board),
+        Row::variable(panel::STEP, Unsigned16, ReadOnly, Item::Board),
         node(index::BOOT_LETTER, Unsigned8, ReadOnly, Item::BootLetter),
         node(index::BOOT_WORDS, VisibleString, ReadOnly, Item::BootWords),
         node(index::EMCY_WORDS, VisibleString, ReadOnly, Item::EmcyWords),
@@ -327,20 +374,8 @@ pub(super) static TABLE: [Row; 56] = {
         transfer_test((1, 3), ReadWrite),
         transfer_test((4, 4), WriteOnly),
         transfer_test((5, 7), ReadOnly),
-        Row::array(
-            index::MEASURED,
-            (1, 1),
-            Unsigned32,
-            ReadWrite,
-            Item::Measured,
-        ),
-        Row::array(
-            index::MEASURED,
-            (2, 13),
-            Unsigned32,
-            ReadOnly,
-            Item::Measured,
-        ),
+        Row::array(index::MEASURED, (1, 1), Unsigned32, ReadWrite, Item::Board),
+        Row::array(index::MEASURED, (2, 13), Unsigned32, ReadOnly, Item::Board),
         Row::variable(index::EMCY_HISTORY, Unsigned8, ReadWrite, Item::EmcyCount)
             .up_to(index::EMCY_HISTORY_LAST),
         Row::array(

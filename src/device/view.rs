@@ -5,15 +5,17 @@ use super::Board;
 use super::Event;
 use super::dictionary::Dictionary;
 use super::lookup::Found;
+use super::own_tpdo;
 use super::pdo::Mirrored;
 use super::settings::RESTORE_ALL;
 use super::table::Item;
 use super::window::{Window, concise_dcf};
 use crate::emcy::EmcyCobId;
+use crate::frame::{Frame, MAX_DATA};
 use crate::id::{Address, CobId, FunctionCode, NodeId};
 use crate::network;
 use crate::nmt::{Command, NodeControl, Target};
-use crate::od::{Access, Chunk, DataType, Entry, ObjectDictionary, Value, read_bytes};
+use crate::od::{Access, Chunk, DataType, Entry, ObjectDictionary, Part, Value, read_bytes};
 use crate::pdo::Direction;
 use crate::sdo::AbortCode;
 use crate::time::Instant;
@@ -29,14 +31,26 @@ const NOT_USED: u32 = 1 << 31;
 
 /// The dictionary in the hands of the SDO server, at a moment.
 pub(super) struct View<'a, B, const N: usize> {
-    pub(super) dictionary: &'a mut Dictionary<N>,
-    pub(super) board: &'a mut B,
-    pub(super) now: Instant,
+    dictionary: &'a mut Dictionary<N>,
+    board: &'a mut B,
+    now: Instant,
 }
 
-impl<B: Board, const N: usize> View<'_, B, N> {
-    /// The bytes of a value of fixed size.
-    fn value(&mut self, found: &Found) -> Result<u64, AbortCode> {
+impl<'a, B: Board, const N: usize> View<'a, B, N> {
+    pub(super) const fn new(
+        dictionary: &'a mut Dictionary<N>,
+        board: &'a mut B,
+        now: Instant,
+    ) -> View<'a, B, N> {
+        View {
+            dictionary,
+            board,
+            now,
+        }
+    }
+
+    /// The bytes of the value of the entry that was found, of fixed size.
+    fn value(&mut self, at: Address, found: &Found) -> Result<u64, AbortCode> {
         let dictionary = &*self.dictionary;
         let network = dictionary.network;
         let known = found.node.and_then(|id| dictionary.node(id));
@@ -86,11 +100,19 @@ impl<B: Board, const N: usize> View<'_, B, N> {
                     }
                 }
             }
+            Item::OwnTpdo => {
+                let node = network.master.node;
+                dictionary.own_tpdos.get(found.place, found.sub, node)
+            }
+            Item::OwnMapping => {
+                let entry = own_tpdo::mapped(found.place, found.sub, network.nodes.len());
+                entry.ok_or(AbortCode::NO_SUCH_SUB_INDEX)?.0
+            }
             Item::Zero => 0,
             Item::NmtRequest if found.node == Some(network.master.node) => {
                 dictionary.state.code().into()
             }
-            Item::NmtRequest => record.map_or(0, |record| record.presence.code()).into(),
+            Item::NmtRequest => record.map_or(0, |record| record.presence.0).into(),
             Item::Expected => {
                 let identity = known.map(|(node, _)| &node.identity);
                 let expected = identity.and_then(|identity| match found.place {
@@ -115,11 +137,10 @@ impl<B: Board, const N: usize> View<'_, B, N> {
             }
             Item::Clock => {
                 let time = dictionary.clock.time(self.now).ok_or(AbortCode::NO_DATA)?;
-                let [a, b, c, d, e, f] = time.encode();
-                return Ok(u64::from_le_bytes([a, b, c, d, e, f, 0, 0]));
+                return Ok(time.number());
             }
             Item::TransferTest => dictionary.transfer.word(found.n()),
-            Item::Measured => self.board.measured(found.sub),
+            Item::Board => self.board.number(at)?,
             Item::Process => {
                 let process = dictionary.process(found).ok_or(AbortCode::NO_DATA)?;
                 let (node, pdo) = (process.node, process.number);
@@ -152,13 +173,37 @@ fn sdo_channel(sub: u8, server: NodeId) -> u32 {
     CobId::of(function, server).get().into()
 }
 
+impl<B: Board, const N: usize> View<'_, B, N> {
+    /// The board's own TPDO that is due, with the values of this moment.
+    pub(super) fn own_tpdo(&mut self) -> Option<Frame> {
+        let network = self.dictionary.network;
+        let n = self.dictionary.own_tpdos.take_due()?;
+        let mut data = [0; MAX_DATA];
+        let mut length = 0;
+        for sub in 1.. {
+            let Some(entry) = own_tpdo::mapped(n, sub, network.nodes.len()) else {
+                break;
+            };
+            let bytes = self.get(entry.at()).ok()?.padded();
+            let size = usize::from(entry.bits() / u8::BITS as u8);
+            for (to, from) in data.iter_mut().skip(length).zip(bytes).take(size) {
+                *to = from;
+            }
+            length += size;
+        }
+        let id = own_tpdo::id(n, network.master.node);
+        Some(Frame::of_padded(id, length as u8, data))
+    }
+}
+
 impl<B: Board, const N: usize> ObjectDictionary for View<'_, B, N> {
     fn entry(&self, at: Address) -> Result<Entry, AbortCode> {
         self.dictionary.entry(at)
     }
 
-    fn kind(&self, at: Address) -> Result<(DataType, Access), AbortCode> {
-        let found = self.dictionary.find(at)?;
+    fn kind(&mut self, at: Address) -> Result<(DataType, Access), AbortCode> {
+        let mut found = Found::NOTHING;
+        self.dictionary.find(at, &mut found)?;
         Ok((found.data_type, found.access))
     }
 
@@ -168,17 +213,18 @@ impl<B: Board, const N: usize> ObjectDictionary for View<'_, B, N> {
     }
 
     fn get(&mut self, at: Address) -> Result<Value, AbortCode> {
-        let found = self.dictionary.find(at)?;
-        let value = self.value(&found)?;
+        let mut found = Found::NOTHING;
+        self.dictionary.find(at, &mut found)?;
+        let value = self.value(at, &found)?;
         Ok(Value::new(found.data_type, value as i64))
     }
 
     fn set(&mut self, at: Address, value: Value) -> Result<(), AbortCode> {
         let dictionary = &mut *self.dictionary;
-        let [a, b, c, d, e, f, ..] = value.padded();
-        // No entry that can be written is signed.
-        let number = u32::from_le_bytes([a, b, c, d]);
-        let found = dictionary.find(at)?;
+        let bytes = u64::from_le_bytes(value.padded());
+        let number = bytes as u32;
+        let mut found = Found::NOTHING;
+        dictionary.find(at, &mut found)?;
         // 80h, all nodes, is not a node-ID.
         let node = found.node;
         let target = node.map_or(Target::All, Target::Node);
@@ -204,11 +250,15 @@ impl<B: Board, const N: usize> ObjectDictionary for View<'_, B, N> {
                 dictionary.may_request(self.board, NodeControl { command, target })?;
                 return dictionary.push(Event::Configure(target));
             }
-            // Whatever is written.
-            Item::Measured => self.board.measure_anew(),
+            Item::Board => return self.board.set_number(at, number),
+            Item::OwnTpdo => {
+                let master = dictionary.network.master.node;
+                let (n, sub) = (found.place, found.sub);
+                return dictionary.own_tpdos.set(n, sub, master, number);
+            }
             Item::TransferTest => return dictionary.set_transfer_word(found.n(), number),
             Item::Clock => {
-                let time = TimeOfDay::decode([a, b, c, d, e, f]);
+                let time = TimeOfDay::of_number(bytes);
                 let time = time.ok_or(AbortCode::VALUE_RANGE)?;
                 dictionary.clock.set(time, self.now);
             }
@@ -219,7 +269,8 @@ impl<B: Board, const N: usize> ObjectDictionary for View<'_, B, N> {
 
     fn read(&mut self, at: Address, offset: u32, buf: &mut [u8]) -> Result<Chunk, AbortCode> {
         let dictionary = &*self.dictionary;
-        let found = dictionary.find(at)?;
+        let mut found = Found::NOTHING;
+        dictionary.find(at, &mut found)?;
         let known = found.node.and_then(|id| dictionary.node(id));
         let description = &dictionary.description;
         let text = match found.item {
@@ -252,8 +303,18 @@ impl<B: Board, const N: usize> ObjectDictionary for View<'_, B, N> {
                 }
                 return Ok(window.chunk());
             }
+            Item::Board => return self.board.read(at, offset, buf),
             _ => return Err(AbortCode::UNSUPPORTED_ACCESS),
         };
         Ok(read_bytes(text.as_bytes(), offset, buf))
+    }
+
+    /// Of the entries without a fixed size only the board's can be written.
+    fn write(&mut self, at: Address, part: Part<'_>) -> Result<(), AbortCode> {
+        self.board.write(at, part)
+    }
+
+    fn cancel(&mut self, at: Address) {
+        self.board.cancel(at);
     }
 }

@@ -36,7 +36,7 @@ impl<T, const N: usize> History<T, N> {
 
     /// Forgets all.
     pub fn clear(&mut self) {
-        *self = History::new();
+        self.0.fill_with(|| None);
     }
 }
 

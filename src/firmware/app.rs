@@ -43,7 +43,10 @@ mod app {
         design,
         id::{CobId, FunctionCode},
         master::{AxisMap, Debounce, ExtendedClock, MasterOd, Supervisor},
-        motion::{AxisCommand, Director, Group, GroupEvent},
+        motion::{
+            AxisCommand, Director, Group, GroupEvent,
+            panel::{PROGRAM_BYTES, Panel},
+        },
         network::Network,
         nmt,
         sync::SyncCounter,
@@ -81,6 +84,7 @@ mod app {
         period: timers::Period,
         deadline: timers::Deadline,
         director: &'static mut Director<AXES>,
+        panel: &'static mut Panel<AXES>,
         events_to: Producer<'static, GroupEvent>,
         tick: timers::Tick,
         microseconds: timers::Microseconds,
@@ -122,6 +126,8 @@ mod app {
         group: Group<AXES> = Group::ZERO,
         planning: Director<AXES> = Director::ZERO,
         axes_place: MaybeUninit<Axes> = MaybeUninit::uninit(),
+        panel_place: MaybeUninit<Panel<AXES>> = MaybeUninit::uninit(),
+        program: [u8; PROGRAM_BYTES] = [0; PROGRAM_BYTES],
         boot_place: MaybeUninit<NetworkBoot<AXES>> = MaybeUninit::uninit(),
         own_place: MaybeUninit<OwnNode> = MaybeUninit::uninit(),
         line_places: [Line; BUSES] = [const { Line::new() }; BUSES],
@@ -192,6 +198,7 @@ mod app {
                 period: board.period,
                 deadline: board.deadline,
                 director: configured(cx.local.planning),
+                panel: new_panel(cx.local.panel_place, cx.local.program),
                 events_to,
                 tick: board.tick,
                 microseconds: board.microseconds,
@@ -243,6 +250,14 @@ mod app {
     fn configured(director: &'static mut Director<AXES>) -> &'static mut Director<AXES> {
         director.configure(&derived::GROUP);
         director
+    }
+
+    #[inline(never)]
+    fn new_panel(
+        place: &'static mut MaybeUninit<Panel<AXES>>,
+        program: &'static mut [u8],
+    ) -> &'static mut Panel<AXES> {
+        place.write(Panel::new(&derived::GROUP, program))
     }
 
     #[inline(never)]
@@ -528,7 +543,7 @@ mod app {
     #[task(
         priority = 1,
         local = [
-            reset_cause, clock, boot, director, answers, transfer_answers, states, news, events, own, requests, orders_to,
+            reset_cause, clock, boot, director, panel, answers, transfer_answers, states, news, events, own, requests, orders_to,
             sync_period, store,
         ],
         shared = [od, sender, lines, control, commands, axes]

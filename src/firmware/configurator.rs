@@ -5,6 +5,7 @@ use crate::{
     app::app::{CLOCK, NETWORK, sdo_configurator as task},
     derived::PROGRAM,
     duties::Silent,
+    lines::SYNCS,
     log::{self, Log},
     modes::Modes,
     roll::{self, Task},
@@ -18,6 +19,7 @@ use canmaster::{
     nmt::State,
     time::{Duration, Instant},
 };
+use core::sync::atomic::Ordering::Relaxed;
 use nucleo_g474re::reset_cause::ResetCause;
 use rtic::Mutex;
 
@@ -33,6 +35,8 @@ pub(crate) struct Configurator<'a> {
     silent: Silent,
     transfer: Option<Transfer>,
     modes: Modes,
+    /// SYNCs that the device was told of.
+    syncs: u32,
 }
 
 impl<'a> Configurator<'a> {
@@ -56,6 +60,7 @@ impl<'a> Configurator<'a> {
             silent: Silent::default(),
             transfer: None,
             modes: Modes::NONE,
+            syncs: 0,
         };
         for setting in [
             Setting::SyncOverflow,
@@ -80,6 +85,10 @@ impl<'a> Configurator<'a> {
             &mut self.shared.lines,
             now,
         );
+        let syncs = SYNCS.load(Relaxed);
+        let device = &mut self.local.own.device;
+        device.on_syncs(syncs.wrapping_sub(self.syncs));
+        self.syncs = syncs;
         while self.serve() {
             while let Some(event) = self.local.own.device.take_event() {
                 self.obey(&event);
@@ -104,6 +113,9 @@ impl<'a> Configurator<'a> {
             + 1;
         let motion = self.now() + Duration::from_micros(patience * CYCLE_US);
         next = motion.min(next);
+        if self.local.own.device.sends_tpdos() {
+            next = next.min(self.now() + NETWORK.cycle);
+        }
         for deadline in [boots, self.local.own.device.next_deadline(), tested] {
             next = deadline.map_or(next, |deadline| deadline.min(next));
         }
@@ -114,18 +126,22 @@ impl<'a> Configurator<'a> {
     /// hand over what is planned.
     fn direct(&mut self) {
         let director = &mut *self.local.director;
+        let panel = &mut *self.local.panel;
         let (refused, plan) = self.shared.axes.lock(|axes| {
             let refused = match core::mem::take(&mut axes.pressed) {
                 true => director.run(axes.group).err(),
                 false => None,
             };
-            (refused, director.look(axes.group, &PROGRAM))
+            panel.poll(axes.group);
+            let program = panel.program().unwrap_or(PROGRAM.as_slice());
+            (refused, director.look(axes.group, program))
         });
+        let program = panel.program().unwrap_or(PROGRAM.as_slice());
         if plan {
-            director.think(&PROGRAM);
+            director.think(program);
             self.shared
                 .axes
-                .lock(|axes| director.act(axes.group, &PROGRAM));
+                .lock(|axes| director.act(axes.group, program));
         }
         let refused = refused.map(GroupEvent::ReleaseRefused);
         for event in [refused, director.take_event()].into_iter().flatten() {
@@ -151,6 +167,7 @@ impl<'a> Configurator<'a> {
         while let Some(event) = local.events.dequeue() {
             self.silent.group(&event, local.boot);
             local.own.group(&event);
+            local.panel.on_event(&event);
             self.log.group(&event);
         }
         let bus_off = self.shared.control.lock(|control| control.bus_off);

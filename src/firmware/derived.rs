@@ -65,6 +65,17 @@ pub(crate) const WINDOW_US: u16 = {
     first
 };
 
+/// The board's own TPDOs have half of the planned slots where there is one in a cycle:
+/// so many SYNCs from one to the next, at least, of each of the four.
+pub(crate) const TPDO_EVERY: u8 = {
+    let (mut planned, mut bus) = (false, 0);
+    while bus < BUSES {
+        planned |= ONE_PLANNED[bus];
+        bus += 1;
+    }
+    if planned { 2 * 4 } else { 1 }
+};
+
 /// The controller of each bus.
 pub(crate) const CONTROLLERS: [Controller; BUSES] = {
     let (mut all, mut bus) = ([Controller::FDCAN1; BUSES], 0);

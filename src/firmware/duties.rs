@@ -37,6 +37,9 @@ impl Configurator<'_> {
             store: self.local.store,
             od: &mut self.shared.od,
             commands: &mut self.shared.commands,
+            axes: &mut self.shared.axes,
+            director: self.local.director,
+            panel: self.local.panel,
         };
         let changed = self.local.own.update(&control, board, now);
         let request = self.local.requests.dequeue();

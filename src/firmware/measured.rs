@@ -109,6 +109,9 @@ pub(crate) fn anew() {
     }
 }
 
+/// What it is read by.
+pub(crate) const INDEX: u16 = 0x2F20;
+
 /// The entry `sub` of 2F20h.
 pub(crate) fn entry(sub: u8) -> u32 {
     let latest = get(Figure::Latest);

@@ -10,8 +10,9 @@
 
 use crate::{
     asking,
+    axes::Axes,
     control::Control,
-    derived::{AXES, PDOS, SYNC_LIMITS},
+    derived::{AXES, PDOS, PROGRAM, SYNC_LIMITS, TPDO_EVERY},
     log::News,
     measured,
 };
@@ -22,10 +23,12 @@ use canmaster::{
     device::{self, Description, Device, Identity, MasterError, Setting, Settings},
     emcy::EmcyCode,
     frame::MAX_DATA,
+    id::Address,
     master::{IMAGE_BYTES, MasterOd, Notice, WrongLength},
-    motion::{AxisCommand, FaultCause, GroupEvent, GroupState},
+    motion::{AxisCommand, Director, FaultCause, GroupEvent, GroupState, panel::Panel},
     network::Network,
     nmt::{Command, ErrorControl, NodeControl, State, Target},
+    od::{self, Chunk, Part},
     sdo::AbortCode,
     store::{self, Store},
     time::{Duration, Instant},
@@ -48,6 +51,7 @@ fn description() -> Description {
             ..Identity::default()
         },
         sync: SYNC_LIMITS,
+        tpdo_every: TPDO_EVERY,
     }
 }
 
@@ -76,18 +80,22 @@ pub(crate) enum Order {
 
 /// The process data that the object dictionary mirrors: TPDOs as they last came,
 /// and what each axis was last told.
-pub(crate) struct Mirror<'a, O, C> {
+pub(crate) struct Mirror<'a, O, C, A> {
     pub(crate) network: &'static Network,
     pub(crate) boot: &'a NetworkBoot<AXES>,
     pub(crate) store: &'a mut Option<Storage>,
     pub(crate) od: &'a mut O,
     pub(crate) commands: &'a mut C,
+    pub(crate) axes: &'a mut A,
+    pub(crate) director: &'a mut Director<AXES>,
+    pub(crate) panel: &'a mut Panel<AXES>,
 }
 
-impl<O, C> device::Board for Mirror<'_, O, C>
+impl<O, C, A> device::Board for Mirror<'_, O, C, A>
 where
     O: Mutex<T = MasterOd<AXES>>,
     C: Mutex<T = [AxisCommand; AXES]>,
+    A: Mutex<T = &'static mut Axes>,
 {
     fn save(&mut self, settings: &[u8]) -> Result<(), AbortCode> {
         let store = self.store.as_mut().ok_or(AbortCode::DEVICE_STATE)?;
@@ -104,20 +112,44 @@ where
         allowed.map_err(|_| AbortCode::DEVICE_STATE)
     }
 
-    fn measured(&mut self, sub: u8) -> u32 {
-        measured::entry(sub)
+    fn number(&mut self, at: Address) -> Result<u32, AbortCode> {
+        if at.index.0 == measured::INDEX {
+            return Ok(measured::entry(at.sub.0));
+        }
+        let (panel, director) = (&*self.panel, &*self.director);
+        Ok(self.axes.lock(|axes| panel.get(at, axes.group, director)))
     }
 
-    fn measure_anew(&mut self) {
-        measured::anew();
+    fn set_number(&mut self, at: Address, value: u32) -> Result<(), AbortCode> {
+        if at.index.0 == measured::INDEX {
+            measured::anew();
+            return Ok(());
+        }
+        let (panel, director) = (&mut *self.panel, &mut *self.director);
+        self.axes
+            .lock(|axes| panel.set(at, value, axes.group, director))
+    }
+
+    fn read(&mut self, _: Address, offset: u32, buf: &mut [u8]) -> Result<Chunk, AbortCode> {
+        let program = self.panel.program().unwrap_or(PROGRAM.as_slice());
+        Ok(od::read_bytes(program, offset, buf))
+    }
+
+    fn write(&mut self, _: Address, part: Part<'_>) -> Result<(), AbortCode> {
+        // Only this task lets a program run.
+        let state = self.axes.lock(|axes| axes.group.state());
+        self.panel.write(&part, state, self.director)
+    }
+
+    fn cancel(&mut self, _: Address) {
+        self.panel.cancel();
     }
 
     fn tpdo(&mut self, node: NodeId, number: u8) -> [u8; 8] {
-        let image = self
-            .network
-            .find(node)
-            .map(|(axis, _)| self.od.lock(|od| *od.image(axis)));
-        pdo(&image.unwrap_or([0; IMAGE_BYTES]), number)
+        match self.network.find(node) {
+            Some((axis, _)) => self.od.lock(|od| pdo(od.image(axis), number)),
+            None => [0; MAX_DATA],
+        }
     }
 
     fn rpdo(&mut self, node: NodeId, number: u8) -> [u8; 8] {

@@ -341,7 +341,7 @@ impl AxisPdos {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::network::sample::SIX_EPOS4;
+    use crate::network::sample::SIX_EPOS4_10_MS as SIX_EPOS4;
 
     const PDOS: usize = TPDOS_PER_AXIS;
 
@@ -356,8 +356,10 @@ mod tests {
     }
 
     #[test]
-    fn the_sample_network_has_these_pdos() {
+    fn the_sample_networks_have_these_pdos() {
         assert_eq!(AxisPdos::tpdo_bytes(&pdos()), [[6, 6]; 6]);
+        let fast = AxisPdos::of_all(&crate::network::sample::SIX_EPOS4).unwrap();
+        assert_eq!(AxisPdos::tpdo_bytes(&fast), [[6, 0]; 6]);
         assert_eq!(AxisPdos::of_all::<7>(&SIX_EPOS4), None);
         let [pdos, ..] = pdos();
         assert!(Mode::ALL.into_iter().all(|mode| pdos.has_mode(mode)));

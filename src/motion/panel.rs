@@ -11,7 +11,9 @@
 
 use super::mode::Mode;
 use super::program::AxisMove;
-use super::{Director, FaultCause, Group, GroupConfig, GroupEvent, GroupState, Order, Refusal};
+use super::{
+    Director, FaultCause, Group, GroupConfig, GroupEvent, GroupState, Order, PlanError, Refusal,
+};
 use crate::id::Address;
 use crate::od::Part;
 use crate::sdo::AbortCode;
@@ -79,15 +81,24 @@ enum Reason {
     Busy = 7,
     /// There is no such command or axis; detail: what was written.
     Unknown = 8,
-    /// A value of the move or of the program breaks a limit.
-    Limit = 9,
 }
+
+impl Reason {
+    /// Whether another value would have been taken.
+    const fn of_the_value(reason: u8) -> bool {
+        reason == Reason::NoSuchMode as u8 || reason == Reason::Unknown as u8
+    }
+}
+
+/// Reasons from here on are a [`Fault`](super::Fault) of a move or of a program.
+const FAULTS: u8 = 16;
 
 /// What clients have set, and what they are told. Reasons of refusals (2002h): 1 not in
 /// this state of the group (detail: the state), 2 no TPDO of the axis, 3 the axis turns
 /// (rpm), 4 network not ready, 5 axis in another mode (its mode), 6 the drive lacks the
 /// mode (the mode), 7 the last command is not carried out yet, 8 no such command or axis
-/// (what was written), 9 a move or program breaks a limit (of a program: the step).
+/// (what was written), 16 and above a move or program that cannot be made: the number of its
+/// [`Fault`](super::Fault) above 16 (of a program the step, else the low bits of the value).
 #[derive(Debug)]
 pub struct Panel<const N: usize> {
     config: &'static GroupConfig<N>,
@@ -329,7 +340,7 @@ impl<const N: usize> Panel<N> {
         }
     }
 
-    /// Takes a part of a program, 200Fh: in standby, while none runs. What was
+    /// Takes a part of a program, 200Fh: in the `state` standby, while none runs. What was
     /// downloaded before is gone as soon as the first part comes.
     ///
     /// # Errors
@@ -338,10 +349,9 @@ impl<const N: usize> Panel<N> {
     pub fn write(
         &mut self,
         part: &Part<'_>,
-        group: &Group<N>,
+        state: GroupState,
         director: &Director<N>,
     ) -> Result<(), AbortCode> {
-        let state = group.state();
         if state != GroupState::Standby || director.step() != 0 {
             return self.note(Err(Refusal::NotIn(state).into()));
         }
@@ -360,9 +370,7 @@ impl<const N: usize> Panel<N> {
             self.loading = false;
             let bytes = self.program.get(..to).unwrap_or_default();
             let checked = super::format::check(bytes, self.config);
-            self.note(
-                checked.map_err(|error| Refused::new(NONE, Reason::Limit, error.step.into())),
-            )?;
+            self.note(checked.map_err(Refused::of))?;
             self.length = to;
         }
         Ok(())
@@ -391,12 +399,26 @@ struct Refused {
 
 impl Refused {
     const fn new(axis: u8, reason: Reason, detail: u32) -> Refused {
+        Refused::because(axis, reason as u8, detail)
+    }
+
+    /// A move or a program that cannot be made.
+    const fn of(error: PlanError) -> Refused {
+        let detail = match error.step {
+            0 => error.value as u32,
+            step => step as u32,
+        };
+        Refused::because(error.axis, FAULTS + error.fault as u8, detail)
+    }
+
+    const fn because(axis: u8, reason: u8, detail: u32) -> Refused {
         let axis = if axis == NONE { NONE } else { axis + 1 };
         Refused {
             why: (axis as u32) << 24 | (reason as u32) << 16 | detail & u16::MAX as u32,
-            code: match reason {
-                Reason::NoSuchMode | Reason::Unknown | Reason::Limit => AbortCode::VALUE_RANGE,
-                _ => AbortCode::DEVICE_STATE,
+            code: if reason >= FAULTS || Reason::of_the_value(reason) {
+                AbortCode::VALUE_RANGE
+            } else {
+                AbortCode::DEVICE_STATE
             },
         }
     }
@@ -411,7 +433,7 @@ impl From<Refusal> for Refused {
             }
             Refusal::WrongMode { axis, mode } => (axis, Reason::WrongMode, mode as u32),
             Refusal::ModeNotSupported { axis, mode, .. } => (axis, Reason::NoSuchMode, mode as u32),
-            Refusal::Program(error) => (error.axis, Reason::Limit, error.value as u32),
+            Refusal::Program(error) => return Refused::of(error),
             Refusal::NetworkNotReady => (NONE, Reason::Network, 0),
             Refusal::NotIn(state) | Refusal::NotInStandby(state) => {
                 (NONE, Reason::State, state as u32)

@@ -7,8 +7,9 @@ use crate::objects;
 use crate::pdo::{MappingEntry, Transmission};
 use crate::time::Duration;
 
-/// SYNC period in milliseconds; 60C2h wants it in the same unit.
-const CYCLE_MS: u8 = 10;
+/// SYNC periods in milliseconds; 60C2h wants them in the same unit.
+const CYCLE_MS: u8 = 2;
+const LONG_CYCLE_MS: u8 = 10;
 
 /// EPOS4: servo drive after CiA 402.
 const EPOS4_DEVICE_TYPE: u32 = 0x0002_0192;
@@ -95,15 +96,27 @@ const TPDOS: &[Pdo] = &[
     },
 ];
 
-const START_VALUES: &[ConfigWrite] = &[
-    ConfigWrite::u8(objects::MODES_OF_OPERATION, PROFILE_VELOCITY),
-    ConfigWrite::u8(objects::INTERPOLATION_TIME, CYCLE_MS),
-    ConfigWrite::u32(objects::MAX_PROFILE_VELOCITY, MAX_SPEED_RPM),
-    ConfigWrite::u32(objects::MAX_MOTOR_SPEED, MAX_SPEED_RPM),
-    ConfigWrite::u32(objects::MAX_ACCELERATION, MAX_ACCELERATION_RPM_S),
-    ConfigWrite::u32(objects::QUICK_STOP_DECELERATION, QUICK_STOP_RPM_S),
-    ConfigWrite::u16(objects::ABORT_CONNECTION_OPTION, QUICK_STOP_ON_LOST_MASTER),
-];
+/// Six axes in 2 ms leave no room for the second: the velocity follows from the
+/// positions.
+const TPDO1: &[Pdo] = match TPDOS {
+    [first, ..] => core::slice::from_ref(first),
+    [] => TPDOS,
+};
+
+const START_VALUES: &[ConfigWrite] = &start_values(CYCLE_MS);
+const LONG_START_VALUES: &[ConfigWrite] = &start_values(LONG_CYCLE_MS);
+
+const fn start_values(cycle_ms: u8) -> [ConfigWrite; 7] {
+    [
+        ConfigWrite::u8(objects::MODES_OF_OPERATION, PROFILE_VELOCITY),
+        ConfigWrite::u8(objects::INTERPOLATION_TIME, cycle_ms),
+        ConfigWrite::u32(objects::MAX_PROFILE_VELOCITY, MAX_SPEED_RPM),
+        ConfigWrite::u32(objects::MAX_MOTOR_SPEED, MAX_SPEED_RPM),
+        ConfigWrite::u32(objects::MAX_ACCELERATION, MAX_ACCELERATION_RPM_S),
+        ConfigWrite::u32(objects::QUICK_STOP_DECELERATION, QUICK_STOP_RPM_S),
+        ConfigWrite::u16(objects::ABORT_CONNECTION_OPTION, QUICK_STOP_ON_LOST_MASTER),
+    ]
+}
 
 /// One of the drives.
 pub(crate) const fn epos4(id: NodeId, name: &'static str) -> Node {
@@ -118,13 +131,13 @@ pub(crate) const fn epos4(id: NodeId, name: &'static str) -> Node {
             revision: Some(EPOS4_REVISION),
             serial: Some(FIRST_SERIAL + id.get() as u32),
         },
-        // Ten per second each: noise on the bus, but a dead drive is known
-        // within two periods even where its TPDOs were not yet started.
+        // Ten per second each, until it is operational and its TPDOs tell: a dead
+        // drive is known within two periods.
         heartbeat_ms: 100,
         // Four of the master's periods, so that one lost frame stops nobody.
         consumer_ms: 200,
         rpdos: RPDOS,
-        tpdos: TPDOS,
+        tpdos: TPDO1,
         start_values: START_VALUES,
         sdo_timeout: Duration::from_millis(100),
         // An EPOS4 has no 1020h.
@@ -132,25 +145,48 @@ pub(crate) const fn epos4(id: NodeId, name: &'static str) -> Node {
     }
 }
 
-/// Six drives on one bus: the experiment of the system that this project grew
-/// out of.
-pub static SIX_EPOS4: Network = Network {
-    bit_rate: 1_000_000,
-    cycle: Duration::from_millis(CYCLE_MS as u32),
-    master: Master {
-        node: NodeId::MAX,
-        heartbeat: Duration::from_millis(50),
-        silence: Duration::from_millis(600),
-        boot_time: Duration::from_millis(1500),
-        sdo_tries: 3,
-        syncs_before_start: 2,
-    },
-    nodes: &[
+const fn six() -> [Node; 6] {
+    [
         epos4(NodeId::constant::<1>(), "axis 1"),
         epos4(NodeId::constant::<2>(), "axis 2"),
         epos4(NodeId::constant::<3>(), "axis 3"),
         epos4(NodeId::constant::<4>(), "axis 4"),
         epos4(NodeId::constant::<5>(), "axis 5"),
         epos4(NodeId::constant::<6>(), "axis 6"),
-    ],
-};
+    ]
+}
+
+/// The same drives with both TPDOs.
+const fn unhurried([a, b, c, d, e, f]: [Node; 6]) -> [Node; 6] {
+    const fn one(node: Node) -> Node {
+        Node {
+            tpdos: TPDOS,
+            start_values: LONG_START_VALUES,
+            ..node
+        }
+    }
+    [one(a), one(b), one(c), one(d), one(e), one(f)]
+}
+
+const fn network(cycle_ms: u8, nodes: &'static [Node]) -> Network {
+    Network {
+        bit_rate: 1_000_000,
+        cycle: Duration::from_millis(cycle_ms as u32),
+        master: Master {
+            node: NodeId::MAX,
+            heartbeat: Duration::from_millis(50),
+            silence: Duration::from_millis(600),
+            boot_time: Duration::from_millis(1500),
+            sdo_tries: 3,
+            syncs_before_start: 2,
+        },
+        nodes,
+    }
+}
+
+/// Six drives on one bus: the experiment of the system that this project grew
+/// out of.
+pub static SIX_EPOS4: Network = network(CYCLE_MS, &const { six() });
+
+/// The same in five times the cycle, with both TPDOs: `networks/one_bus_10ms.toml`.
+pub static SIX_EPOS4_10_MS: Network = network(LONG_CYCLE_MS, &const { unhurried(six()) });

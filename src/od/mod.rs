@@ -57,7 +57,7 @@ pub trait ObjectDictionary {
     ///
     /// # Errors
     /// As [`entry`](Self::entry).
-    fn kind(&self, at: Address) -> Result<(DataType, Access), AbortCode> {
+    fn kind(&mut self, at: Address) -> Result<(DataType, Access), AbortCode> {
         let entry = self.entry(at)?;
         Ok((entry.data_type, entry.access))
     }

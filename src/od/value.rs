@@ -119,6 +119,16 @@ impl Value {
         }
     }
 
+    /// How many bytes it has.
+    pub const fn len(&self) -> u8 {
+        self.len
+    }
+
+    /// Of no bytes, as of strings and domains.
+    pub const fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
     /// The bytes, little-endian.
     pub fn bytes(&self) -> &[u8] {
         self.bytes.get(..usize::from(self.len)).unwrap_or(&[])

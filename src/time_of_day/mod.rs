@@ -50,32 +50,39 @@ impl TimeOfDay {
 
     /// As it stands on the wire and in the object dictionary.
     pub const fn encode(self) -> [u8; SIZE] {
-        let [a, b, c, d] = (self.ms & MS_MASK).to_le_bytes();
-        let [low, high] = self.days.to_le_bytes();
+        let [a, b, c, d, low, high, ..] = self.number().to_le_bytes();
         [a, b, c, d, low, high]
+    }
+
+    /// Its bytes as a little-endian number.
+    pub(crate) const fn number(self) -> u64 {
+        (self.days as u64) << u32::BITS | (self.ms & MS_MASK) as u64
+    }
+
+    /// As [`decode`](Self::decode), from the first bytes of a little-endian number.
+    pub(crate) const fn of_number(number: u64) -> Option<TimeOfDay> {
+        TimeOfDay::new((number >> u32::BITS) as u16, number as u32 & MS_MASK)
     }
 
     /// `None` if the milliseconds are a day or more. The four reserved bits are
     /// ignored.
     pub const fn decode(bytes: [u8; SIZE]) -> Option<TimeOfDay> {
         let [a, b, c, d, low, high] = bytes;
-        let ms = u32::from_le_bytes([a, b, c, d]) & MS_MASK;
-        TimeOfDay::new(u16::from_le_bytes([low, high]), ms)
+        TimeOfDay::of_number(u64::from_le_bytes([a, b, c, d, low, high, 0, 0]))
     }
 
     /// The frame to send.
     pub fn frame(self, id: CobId) -> Frame {
-        // Six bytes always fit.
-        Frame::data_frame(id, &self.encode()).unwrap_or(Frame::empty(id))
+        Frame::of_padded(id, SIZE as u8, self.number().to_le_bytes())
     }
 
     /// `None` unless `frame` is a data frame of six bytes with the identifier
     /// `id` and a time that exists.
     pub fn from_frame(frame: &Frame, id: CobId) -> Option<TimeOfDay> {
-        if frame.id() != id {
+        if frame.id() != id || frame.data().len() != SIZE {
             return None;
         }
-        TimeOfDay::decode(<[u8; SIZE]>::try_from(frame.data()).ok()?)
+        TimeOfDay::of_number(u64::from_le_bytes(frame.padded()))
     }
 }
 

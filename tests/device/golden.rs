@@ -183,7 +183,7 @@ fn commands_are_writes() {
 /// 1F22h:01 by block upload, and what it decodes to.
 #[test]
 fn the_concise_dcf_is_what_is_written_to_the_node() {
-    use canmaster::network::{plan, sample::SIX_EPOS4};
+    use canmaster::network::{plan, sample::SIX_EPOS4_10_MS as SIX_EPOS4};
     let mut b = Bench::new();
     for (n, known) in (1..).zip(SIX_EPOS4.nodes) {
         let dcf = b.read(0x1F22, n).unwrap();

@@ -1,7 +1,7 @@
 //! The mirror of the nodes' PDOs and the process image.
 
 use crate::rig::Bench;
-use canmaster::network::sample::SIX_EPOS4;
+use canmaster::network::sample::SIX_EPOS4_10_MS as SIX_EPOS4;
 use canmaster::pdo::MappingEntry;
 
 #[test]
@@ -16,7 +16,8 @@ fn the_masters_rpdos_are_the_nodes_tpdos() {
             assert_eq!(b.number(0x1400 + offset, 2), Ok(1));
         }
         for n in 0..4 {
-            let offset = (place * 4 + n) as u16;
+            // Behind the board's own.
+            let offset = (4 + place * 4 + n) as u16;
             let base = [0x200, 0x300, 0x400, 0x500][n];
             // Not to be asked for by remote frames.
             assert_eq!(b.number(0x1800 + offset, 1), Ok(0x4000_0000 + base + id));
@@ -32,7 +33,7 @@ fn mappings_lead_to_the_process_image() {
     let mut b = Bench::new();
     for (place, known) in SIX_EPOS4.nodes.iter().enumerate() {
         let id = known.id.get();
-        let directions = [(0x1600, known.tpdos, 1_u8), (0x1A00, known.rpdos, 2)];
+        let directions = [(0x1600, known.tpdos, 1_u8), (0x1A04, known.rpdos, 2)];
         for (base, pdos, direction) in directions {
             for (n, pdo) in pdos.iter().enumerate() {
                 let index = base + (place * pdos.len() + n) as u16;

@@ -2,8 +2,10 @@
 
 use canmaster::boot::Event as Step;
 use canmaster::device::{Board, Description, Device, Event, Identity};
-use canmaster::network::sample::SIX_EPOS4;
+use canmaster::id::Address;
+use canmaster::network::sample::SIX_EPOS4_10_MS as SIX_EPOS4;
 use canmaster::nmt::{NodeControl, State};
+use canmaster::od::{Chunk, Part, read_bytes};
 use canmaster::sdo::AbortCode;
 use canmaster::sync::SyncLimits;
 use canmaster::time::{Duration, Instant};
@@ -25,6 +27,7 @@ pub(crate) const DESCRIPTION: Description = Description {
         longest_period: 65_535,
         shortest_window: 300,
     },
+    tpdo_every: 8,
 };
 
 pub(crate) fn node(id: u8) -> NodeId {
@@ -61,6 +64,14 @@ impl Board for Fake {
 
     fn may_request(&mut self, _: NodeControl) -> Result<(), AbortCode> {
         self.refuses_requests.map_or(Ok(()), Err)
+    }
+
+    fn read(&mut self, _: Address, offset: u32, buf: &mut [u8]) -> Result<Chunk, AbortCode> {
+        Ok(read_bytes(b"program", offset, buf))
+    }
+
+    fn write(&mut self, _: Address, _: Part<'_>) -> Result<(), AbortCode> {
+        Err(AbortCode::TOO_LONG)
     }
 
     fn tpdo(&mut self, node: NodeId, number: u8) -> [u8; 8] {

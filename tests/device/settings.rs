@@ -3,7 +3,7 @@
 use crate::rig::{Bench, ms, node};
 use canmaster::boot::{Assignment, Startup};
 use canmaster::device::{Event, Setting};
-use canmaster::network::sample::SIX_EPOS4;
+use canmaster::network::sample::SIX_EPOS4_10_MS as SIX_EPOS4;
 use canmaster::nmt::{Command, ErrorBehaviour, NodeControl, State, Target};
 use canmaster::sdo::AbortCode;
 use canmaster::store::CAPACITY;

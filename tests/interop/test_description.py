@@ -8,7 +8,7 @@ import unittest
 import canopen
 import cantools
 
-from machine import DRIVES, LOG, MASTER, PATIENCE, ROOT, Machine, OnTheBus
+from machine import DRIVES, LOG, MASTER, NETWORK, PATIENCE, ROOT, Machine, OnTheBus
 
 DERIVED = ROOT / "target" / "network"
 EDS = DERIVED / "main-master.eds"
@@ -22,7 +22,7 @@ OPERATION_ENABLED = (0x6F, 0x27)
 def check():
     program = os.environ.get("CANMASTER_XTASK")
     command = [program] if program else ["cargo", "xtask"]
-    subprocess.run([*command, "check"], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([*command, "check", NETWORK], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
 
 
 

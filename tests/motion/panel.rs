@@ -80,7 +80,7 @@ impl Desk {
         let Rig {
             group, director, ..
         } = &mut self.rig;
-        self.panel.write(&part, group, director)
+        self.panel.write(&part, group.state(), director)
     }
 }
 
@@ -184,7 +184,7 @@ fn what_no_axis_can_do_is_refused_with_the_axis() {
     desk.set(panel::VELOCITY, 4, 100_000).unwrap();
     desk.set(panel::ACCELERATION, 4, 1000).unwrap();
     assert_eq!(desk.set(panel::COMMAND, 0, 10), Err(VALUE));
-    assert_eq!(desk.get(panel::REFUSAL, 0) as u32 >> 16, 0x0409);
+    assert_eq!(desk.get(panel::REFUSAL, 0) as u32 >> 16, 0x041C);
 }
 
 #[test]
@@ -262,7 +262,7 @@ fn a_program_that_cannot_be_run_is_refused() {
     desk.write(0, &program, true).unwrap();
     *program.last_mut().unwrap() ^= 1;
     assert_eq!(desk.write(0, &program, true), Err(VALUE));
-    assert_eq!(desk.get(panel::REFUSAL, 0) as u32 >> 16, 0xFF09);
+    assert_eq!(desk.get(panel::REFUSAL, 0) as u32 >> 16, 0xFF14);
     assert_eq!(desk.panel.program(), None);
     assert_eq!(
         desk.write(0, &[0; PROGRAM_BYTES + 1], true),

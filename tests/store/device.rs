@@ -26,6 +26,7 @@ const DESCRIPTION: Description = Description {
         longest_period: 65_535,
         shortest_window: 300,
     },
+    tpdo_every: 8,
 };
 
 struct WithFlash(Store<Flash>);

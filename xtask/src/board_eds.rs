@@ -7,6 +7,7 @@ use canmaster::design;
 use canmaster::device::{Board, Description, Device, Identity};
 use canmaster::frame::{Frame, MAX_DATA};
 use canmaster::id::{Address, CobId, FunctionCode, NodeId};
+use canmaster::motion::panel;
 use canmaster::network::Network;
 use canmaster::nmt::{NodeControl, State};
 use canmaster::objects::SERIAL_NUMBER;
@@ -30,8 +31,11 @@ const LAST_SUB: u8 = 254;
 const PER_NODE: u8 = 64;
 /// The entry that means all nodes.
 const ALL_NODES: u8 = 0x80;
-/// Where the process image begins, the only objects that the board's PDOs carry.
+/// Where the process image begins: besides [`MAPPED`] the only objects that the
+/// board's PDOs carry.
 const PROCESS: u16 = 0x3000;
+/// State, actual positions and program step of the group.
+const MAPPED: [u16; 3] = [panel::STATE, panel::POSITION, panel::STEP];
 const TIMEOUT: Duration = Duration::from_millis(500);
 const BITS_PER_KILO: u32 = 1000;
 
@@ -70,6 +74,7 @@ pub(crate) fn eds(machine: &Machine, bus: usize, network: &'static Network) -> E
         software: env!("CARGO_PKG_VERSION"),
         identity: Identity::default(),
         sync: SyncLimits::NONE,
+        tpdo_every: 1,
     };
     let mut device: Device<NODES> = Device::new(description, network, TIMEOUT);
     device.set_state(State::PreOperational, &mut Bench, Instant::ZERO);
@@ -131,7 +136,8 @@ fn object(
                 od::Access::ReadWrite => Access::ReadWrite,
                 od::Access::Constant => Access::Constant,
             },
-            mappable: index >= PROCESS && *sub > 0,
+            mappable: (index >= PROCESS && *sub > 0)
+                || (MAPPED.contains(&index) && (*sub > 0 || subs.len() == 1)),
             low: None,
             high: None,
             default,
@@ -193,15 +199,16 @@ fn default(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cargo;
     use crate::machine::DESCRIPTION;
-    use crate::{cargo, library};
     use canmaster_network::Source;
     use canmaster_network::object::Address as At;
+    use canmaster_sim::world::library;
 
     fn sample() -> Eds {
         let outcome = canmaster_network::load(&cargo::workspace().join(DESCRIPTION));
         let machine = outcome.machine.unwrap();
-        eds(&machine, 0, library::network(&machine, 0).unwrap())
+        eds(&machine, 0, library::network_of_bus(&machine, 0).unwrap())
     }
 
     #[test]
@@ -229,11 +236,25 @@ mod tests {
         let entry = |index, sub| eds.entry(At::new(index, sub)).unwrap();
         assert_eq!(entry(0x1006, 0).data_type, DataType::Unsigned(32));
         assert_eq!(entry(0x1006, 0).access, Access::ReadWrite);
-        assert_eq!(entry(0x1006, 0).default.unwrap().value, 10_000);
+        assert_eq!(entry(0x1006, 0).default.unwrap().value, 2_000);
         assert_eq!(entry(0x1017, 0).default.unwrap().value, 50);
-        assert_eq!(entry(0x1A00, 1).default.unwrap().value, 0x3001_0510);
+        // The board's own TPDOs, then the mirrored ones.
+        assert_eq!(entry(0x1A00, 1).default.unwrap().value, 0x2001_0008);
+        assert_eq!(entry(0x1A03, 2).default.unwrap().value, 0x2009_0620);
+        assert_eq!(entry(0x1800, 1).default.unwrap().value, 0xC000_01FF);
+        assert_eq!(entry(0x1A04, 1).default.unwrap().value, 0x3001_0310);
+        for (index, sub) in [(0x2001, 0), (0x2009, 6), (0x2010, 0), (0x3001, 1)] {
+            assert!(entry(index, sub).mappable, "{index:X}");
+        }
+        for (index, sub) in [(0x2000, 0), (0x2009, 0), (0x3001, 0), (0x1018, 1)] {
+            assert!(!entry(index, sub).mappable, "{index:X}");
+        }
+        assert_eq!(entry(0x2004, 6).data_type, DataType::Integer(32));
+        assert_eq!(eds.entry(At::new(0x2004, 7)), None);
+        assert_eq!(entry(0x2008, 1).data_type, DataType::Integer(8));
+        assert_eq!(entry(0x200F, 0).data_type, DataType::Domain);
         assert_eq!(entry(0x3001, 1).name, "Statusword");
-        assert_eq!(entry(0x3001, 5).name, "Controlword");
+        assert_eq!(entry(0x3001, 3).name, "Controlword");
         assert_eq!(entry(0x1F22, 6).data_type, DataType::Domain);
         assert_eq!(entry(0x1F82, 0x80).access, Access::WriteOnly);
         assert_eq!(eds.entry(At::new(0x1F22, 7)), None);

@@ -15,6 +15,8 @@ enum Subs {
     Numbered(&'static str),
     /// One for each node-ID.
     PerNode,
+    /// One for each axis.
+    PerAxis,
     /// The process data of a node.
     Process,
 }
@@ -153,6 +155,23 @@ const ROWS: &[Row] = &[
     row(0x1F88, "Serial number identification", Subs::PerNode),
     row(0x1F89, "Boot time", Subs::None),
     row(0x1F8A, "Restore configuration", Subs::PerNode),
+    row(0x2000, "Group command", Subs::None),
+    row(0x2001, "Group state", Subs::None),
+    row(0x2002, "Last refusal", Subs::None),
+    row(0x2003, "Axes of the command", Subs::None),
+    row(0x2004, "Target position", Subs::PerAxis),
+    row(0x2005, "Profile velocity", Subs::PerAxis),
+    row(0x2006, "Profile acceleration", Subs::PerAxis),
+    row(0x2007, "Profile jerk", Subs::None),
+    row(0x2008, "Mode of operation", Subs::PerAxis),
+    row(0x2009, "Actual position", Subs::PerAxis),
+    row(0x200A, "Actual velocity", Subs::PerAxis),
+    row(0x200B, "Reference position", Subs::PerAxis),
+    row(0x200C, "Following error", Subs::PerAxis),
+    row(0x200D, "Statusword", Subs::PerAxis),
+    row(0x200E, "Fault", Subs::PerAxis),
+    row(0x200F, "Program", Subs::None),
+    row(0x2010, "Program step", Subs::None),
     row(0x2F00, "Boot status, letter", Subs::PerNode),
     row(0x2F01, "Boot status in words", Subs::PerNode),
     row(0x2F02, "Newest emergency in words", Subs::PerNode),
@@ -244,6 +263,7 @@ impl<'a> Names<'a> {
                 Some(node) => format!("Node {sub}, {}", node.name),
                 None => "All nodes".to_string(),
             },
+            Subs::PerAxis => format!("Axis {sub}"),
             Subs::Process => self.process(n - 1),
         }
     }

@@ -9,6 +9,7 @@ use crate::cli::{
     Bench, BenchOptions, CiOptions, LogLevel, MachineOptions, RunOptions, TestOptions,
 };
 use crate::image::{Budget, ImageSize};
+use crate::machine::Checked;
 use crate::{bench, cargo, conformance, firmware, interop, networks, run, size, toolchain};
 
 /// A name and what is done.
@@ -38,13 +39,15 @@ pub(crate) fn test(options: &TestOptions) -> Result<ExitCode> {
 
 fn tests(args: &[String]) -> Result<()> {
     let image = firmware::build()?;
+    let unhurried = Checked::read(Some(&cargo::workspace().join(networks::UNHURRIED)))?.build()?;
     // The library's `defmt` feature is off: with it, and DEFMT_LOG set, tests
     // do not link on the host. `ci` checks it by clippy instead.
     cargo::run(
         cargo::cargo()
             .args(["test", "--workspace", "--profile", "host", "--locked"])
             .args(args)
-            .env(firmware::IMAGE_VARIABLE, image),
+            .env(firmware::IMAGE_VARIABLE, image)
+            .env(firmware::IMAGE_10_MS_VARIABLE, unhurried),
     )
 }
 

@@ -23,6 +23,9 @@ const BINARY: &str = "canmaster";
 /// Where tests find an image that is built already.
 pub(crate) const IMAGE_VARIABLE: &str = "CANMASTER_ELF";
 
+/// The same for the image of [`UNHURRIED`](crate::networks::UNHURRIED).
+pub(crate) const IMAGE_10_MS_VARIABLE: &str = "CANMASTER_ELF_10_MS";
+
 /// Tells the build script of another description of the machine.
 const NETWORK_VARIABLE: &str = "CANMASTER_NETWORK";
 

@@ -4,7 +4,9 @@ use std::process::{Command, ExitCode, Stdio};
 
 use anyhow::{Context, Result};
 
-use crate::{cargo, firmware};
+use crate::cargo;
+use crate::machine::Checked;
+use crate::networks::UNHURRIED;
 
 /// What Python is called, on one system or another.
 const NAMES: [&str; 2] = ["python3", "python"];
@@ -21,13 +23,13 @@ pub(crate) fn command() -> Result<ExitCode> {
 
 /// Builds the firmware and runs the tests against it.
 pub(crate) fn tests() -> Result<()> {
-    let image = firmware::build()?;
+    // The tests start machines, one after the other, which are built by then.
+    Checked::read(Some(&cargo::workspace().join(UNHURRIED)))?.build()?;
     let program = std::env::current_exe().context("this program does not know its own name")?;
     let mut command = Command::new(python()?);
     command
         .arg(TESTS)
         .current_dir(cargo::workspace())
-        .env(firmware::IMAGE_VARIABLE, image)
         .env(PROGRAM_VARIABLE, program);
     cargo::run(&mut command)
 }

@@ -14,7 +14,6 @@ mod conformance;
 mod firmware;
 mod image;
 mod interop;
-mod library;
 mod machine;
 mod networks;
 mod new;
@@ -29,6 +28,8 @@ use std::process::ExitCode;
 use cli::{Cli, Command};
 
 fn main() -> ExitCode {
+    // `| head` closes the pipe: that ends the command, it is no defect to report.
+    sigpipe::reset();
     let cli = Cli::parse_or_exit();
     let outcome = match cli.command {
         Command::Run(options) => run::command(&options),

@@ -1,4 +1,4 @@
-//! Machines that differ from the sample by nothing but their description: number
+//! Machines that differ from one of `networks/` by nothing but their description: number
 //! of nodes, bit rate, cycle, mapping. No Rust code is changed for any of them.
 
 use std::fmt::Write;
@@ -18,7 +18,9 @@ use crate::{cargo, new, run};
 const AXES: [u8; 4] = [1, 3, 6, 12];
 /// bit/s
 const BIT_RATES: [u32; 3] = [125_000, 500_000, 1_000_000];
-/// Where the sample's nodes begin.
+/// The one that they differ from, which has time for more axes and slower buses.
+pub(crate) const UNHURRIED: &str = "networks/one_bus_10ms.toml";
+/// Where its nodes begin.
 const NODES: &str = "[[node]]";
 const PER_KILO: u32 = 1000;
 /// Cycles are whole milliseconds: 60C2h has that unit.
@@ -63,6 +65,13 @@ pub(crate) const FOUR: [Variant; 4] = [
 pub(crate) fn all() -> impl Iterator<Item = Variant> {
     AXES.into_iter()
         .flat_map(|axes| BIT_RATES.map(|bit_rate| variant(axes, bit_rate, false)))
+}
+
+/// [`UNHURRIED`] as it reads beside the folder of the EDS files.
+fn sample() -> Result<String> {
+    let path = cargo::workspace().join(UNHURRIED);
+    let text = fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+    Ok(text.replace("../eds/", "eds/"))
 }
 
 /// Builds and runs [`FOUR`].
@@ -132,7 +141,7 @@ impl Variant {
             .join(folder);
         new::copy(&dir)?;
         let path = dir.join(DESCRIPTION);
-        let sample = fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+        let sample = sample()?;
         let text = self.describe(&sample, self.shortest_cycle(&sample, &dir)?);
         fs::write(&path, text).with_context(|| path.display().to_string())?;
         Ok(path)
@@ -151,7 +160,7 @@ impl Variant {
         Ok(smallest.next_multiple_of(MS_US))
     }
 
-    /// The sample's description with other numbers.
+    /// Its description with other numbers.
     fn describe(&self, sample: &str, cycle_us: u32) -> String {
         let common = sample.split(NODES).next().unwrap_or_default();
         let mut text = String::new();
@@ -190,7 +199,7 @@ impl Variant {
     }
 }
 
-/// A line of the sample with another mapping.
+/// A line of it with another mapping.
 fn remapped(line: &str) -> &str {
     match line.trim() {
         r#"map = ["Controlword", "Target velocity"]"# => {
@@ -226,7 +235,7 @@ mod tests {
     #[test]
     fn every_description_is_accepted() {
         let workspace = cargo::workspace();
-        let sample = fs::read_to_string(workspace.join(DESCRIPTION)).unwrap();
+        let sample = sample().unwrap();
         for variant in all().chain(FOUR) {
             let cycle = variant.shortest_cycle(&sample, &workspace).unwrap();
             let text = variant.describe(&sample, cycle);

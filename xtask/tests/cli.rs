@@ -107,7 +107,7 @@ fn machine(folder: &tempfile::TempDir, name: &str, change: impl Fn(String) -> St
 fn a_machine_that_cannot_work_is_refused_in_the_same_words_before_anything_is_built() {
     let folder = tempfile::tempdir().unwrap();
     let file = machine(&folder, "refused", |text| {
-        text.replace("cycle_us = 10_000", "cycle_us = 4_000")
+        text.replace("cycle_us = 2_000", "cycle_us = 1_500")
             .replace("\"Statusword\", ", "\"Statusward\", ")
     });
     let checked = stderr(&xtask().arg("check").arg(&file).assert().code(1));
@@ -157,7 +157,7 @@ fn a_machine_of_ones_own_is_built_and_runs() {
             .replace("increments_per_turn = 2000", "increments_per_turn = 4096")
             .replace("gear = [1, 1]", "gear = [5, 4]")
             .replace("max_speed = 3_000 ", "max_speed = 600 ")
-            .replace("cycle_us = 10_000", "cycle_us = 8_000")
+            .replace("cycle_us = 2_000", "cycle_us = 8_000")
             .replace('\n', "\r\n")
     });
     let assert = xtask()
@@ -354,4 +354,17 @@ fn a_run_that_fails_names_the_node_and_ends_with_exit_code_one() {
     assert!(object["simulated_s"].as_f64().unwrap() <= 3.0);
     let words = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
     assert!(words.contains("node 5"), "{words}");
+}
+
+#[test]
+fn a_reader_that_has_seen_enough_is_no_defect() {
+    let mut child = std::process::Command::new(assert_cmd::cargo::cargo_bin("xtask"))
+        .arg("check")
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let outcome = child.wait_with_output().unwrap();
+    assert_eq!(String::from_utf8_lossy(&outcome.stderr), "");
 }

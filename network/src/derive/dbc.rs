@@ -6,6 +6,8 @@ use crate::model::{Machine, Mapped, Node, Pdo};
 use crate::object::{DataType, Direction};
 
 const MASTER: &str = "master";
+/// A receiver that is not named.
+const ANYBODY: &str = "Vector__XXX";
 /// SIG_VALTYPE_ of IEEE numbers.
 const FLOAT: u8 = 1;
 const DOUBLE: u8 = 2;
@@ -19,14 +21,54 @@ pub fn dbc(machine: &Machine, bus: usize) -> String {
         .collect();
     let mut out = String::new();
     // Writing into a string cannot fail.
-    let _ = write(&nodes, &mut out);
+    let _ = write(machine, &nodes, &mut out);
     out
 }
 
-fn write(nodes: &[&Node], out: &mut String) -> std::fmt::Result {
+/// The board's own TPDOs: 1A00h to 1A03h.
+const OWN_TPDOS: u8 = 4;
+/// Axes whose actual positions are in one of them.
+const AXES_OF_TPDO: usize = 2;
+const POSITION_BITS: usize = 32;
+
+/// State of the group and step of the program; actual positions of two axes each.
+fn own(machine: &Machine, out: &mut String) -> std::fmt::Result {
+    let positions: Vec<String> = machine
+        .nodes
+        .iter()
+        .map(|node| format!("Actual_position_{}", node_name(node)))
+        .collect();
+    let state = vec![
+        "Group_state : 0|8@1+".to_string(),
+        "Program_step : 8|16@1+".to_string(),
+    ];
+    let of_axes = positions.chunks(AXES_OF_TPDO).map(|names| {
+        let signal = |(n, name): (usize, &String)| {
+            format!("{name} : {}|{POSITION_BITS}@1-", n * POSITION_BITS)
+        };
+        names.iter().enumerate().map(signal).collect()
+    });
+    let all = std::iter::once(state).chain(of_axes);
+    for (number, signals) in (1..=OWN_TPDOS).zip(all) {
+        let id = Direction::Transmit.function_code(number) + u16::from(machine.master.node_id);
+        let bytes = match number {
+            1 => 3,
+            _ => signals.len() * POSITION_BITS / u8::BITS as usize,
+        };
+        writeln!(out, "BO_ {id} TPDO{number}_{MASTER}: {bytes} {MASTER}")?;
+        for signal in signals {
+            writeln!(out, " SG_ {signal} (1,0) [0|0] \"\" {ANYBODY}")?;
+        }
+        writeln!(out)?;
+    }
+    Ok(())
+}
+
+fn write(machine: &Machine, nodes: &[&Node], out: &mut String) -> std::fmt::Result {
     writeln!(out, "VERSION \"\"\n\nNS_ :\n\nBS_:\n")?;
     let names: Vec<String> = nodes.iter().map(|node| node_name(node)).collect();
     writeln!(out, "BU_: {MASTER} {}\n", names.join(" "))?;
+    own(machine, out)?;
     let mut comments = String::new();
     let mut types = String::new();
     for (node, name) in nodes.iter().zip(&names) {

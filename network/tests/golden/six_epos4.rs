@@ -8,16 +8,16 @@ use canmaster::time::Duration;
 /// Axes of the group.
 pub const AXES: usize = 6;
 /// When the PDO producer goes ahead without the TPDOs that are missing, us.
-pub const TPDO_DEADLINE_US: u16 = 5000;
+pub const TPDO_DEADLINE_US: u16 = 1130;
 /// Cycles in a row without a TPDO after which its node counts as lost.
 pub const TPDO_MISSING_LIMIT: u8 = 3;
 /// The SYNC periods (1006h) that pass the check of the description, us.
-pub const SHORTEST_CYCLE_US: u32 = 6025;
+pub const SHORTEST_CYCLE_US: u32 = 1960;
 pub const LONGEST_CYCLE_US: u32 = 65535;
 /// From the last TPDO of a cycle to its first RPDO, us.
-pub const COMPUTE_US: u16 = 200;
+pub const COMPUTE_US: u16 = 120;
 /// From the first RPDO of a cycle to the end of the last and the guard, us.
-pub const RPDOS_US: u16 = 825;
+pub const RPDOS_US: u16 = 710;
 /// Buses, in the order of their names.
 pub const BUSES: usize = 1;
 /// The controller of each: 1 for FDCAN1.
@@ -30,15 +30,15 @@ pub const AXIS_BUSES: [u8; AXES] = [0, 0, 0, 0, 0, 0];
 /// computed.
 pub const RPDOS_AFTER_SYNC: bool = false;
 /// So long before SYNC nothing of the master is on the wire, us.
-pub const GUARD_US: u16 = 135;
+pub const GUARD_US: u16 = 20;
 /// Until then a frame that is handed over goes ahead of all TPDOs, us after SYNC.
-pub const AFTER_SYNC_US: [u16; BUSES] = [47];
+pub const AFTER_SYNC_US: [u16; BUSES] = [97];
 /// One slot in a cycle serves SDO frames, the master's heartbeat and RPDOs on change.
-pub const ONE_PLANNED: [bool; BUSES] = [false];
+pub const ONE_PLANNED: [bool; BUSES] = [true];
 /// SDO requests in operational are handed over from then on, us after SYNC,
 pub const SDO_FROM_US: [u16; BUSES] = [0];
 /// and until then; 0: none is.
-pub const SDO_UNTIL_US: [u16; BUSES] = [10000];
+pub const SDO_UNTIL_US: [u16; BUSES] = [97];
 /// The answer comes in the cycle after that of the request, and has its planned slot.
 pub const SDO_NEXT_CYCLE: [bool; BUSES] = [false];
 /// A drive is asked by SDO every so many cycles; 0: never.
@@ -46,7 +46,7 @@ pub const SDO_EVERY: [u16; BUSES] = [0];
 /// The ramps of each axis are sent on change, to one axis of a bus in a cycle.
 pub const RAMPS_ON_CHANGE: [bool; AXES] = [true, true, true, true, true, true];
 /// Whether each node sends its heartbeat in operational, too.
-pub const HEARTBEATS_IN_OPERATIONAL: [bool; AXES] = [true, true, true, true, true, true];
+pub const HEARTBEATS_IN_OPERATIONAL: [bool; AXES] = [false, false, false, false, false, false];
 
 /// The motors, in the order of the axes.
 pub const MOTORS: [Motor; AXES] = [
@@ -126,7 +126,7 @@ pub static PROGRAM: [u8; 226] = [
 /// The bus "main".
 pub static NETWORK: Network = Network {
     bit_rate: 1000000,
-    cycle: Duration::from_micros(10000),
+    cycle: Duration::from_micros(2000),
     master: Master {
         node: NodeId::constant::<127>(),
         heartbeat: Duration::from_millis(50),
@@ -192,18 +192,10 @@ pub static NETWORK: Network = Network {
                         canmaster::pdo::MappingEntry::new(0x6064, 0, 32),
                     ],
                 },
-                canmaster::network::Pdo {
-                    number: 2,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x606C, 0, 32),
-                        canmaster::pdo::MappingEntry::new(0x6077, 0, 16),
-                    ],
-                },
             ],
             start_values: &[
                 canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x6060, 0), 0x3),
-                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x60C2, 1), 0xA),
+                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x60C2, 1), 0x2),
                 canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x607F, 0), 0xBB8),
                 canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x6080, 0), 0xBB8),
                 canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x60C5, 0), 0x4E20),
@@ -269,18 +261,10 @@ pub static NETWORK: Network = Network {
                         canmaster::pdo::MappingEntry::new(0x6064, 0, 32),
                     ],
                 },
-                canmaster::network::Pdo {
-                    number: 2,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x606C, 0, 32),
-                        canmaster::pdo::MappingEntry::new(0x6077, 0, 16),
-                    ],
-                },
             ],
             start_values: &[
                 canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x6060, 0), 0x3),
-                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x60C2, 1), 0xA),
+                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x60C2, 1), 0x2),
                 canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x607F, 0), 0xBB8),
                 canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x6080, 0), 0xBB8),
                 canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x60C5, 0), 0x4E20),
@@ -346,18 +330,10 @@ pub static NETWORK: Network = Network {
                         canmaster::pdo::MappingEntry::new(0x6064, 0, 32),
                     ],
                 },
-                canmaster::network::Pdo {
-                    number: 2,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x606C, 0, 32),
-                        canmaster::pdo::MappingEntry::new(0x6077, 0, 16),
-                    ],
-                },
             ],
             start_values: &[
                 canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x6060, 0), 0x3),
-                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x60C2, 1), 0xA),
+                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x60C2, 1), 0x2),
                 canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x607F, 0), 0xBB8),
                 canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x6080, 0), 0xBB8),
                 canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x60C5, 0), 0x4E20),
@@ -423,18 +399,10 @@ pub static NETWORK: Network = Network {
                         canmaster::pdo::MappingEntry::new(0x6064, 0, 32),
                     ],
                 },
-                canmaster::network::Pdo {
-                    number: 2,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x606C, 0, 32),
-                        canmaster::pdo::MappingEntry::new(0x6077, 0, 16),
-                    ],
-                },
             ],
             start_values: &[
                 canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x6060, 0), 0x3),
-                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x60C2, 1), 0xA),
+                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x60C2, 1), 0x2),
                 canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x607F, 0), 0xBB8),
                 canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x6080, 0), 0xBB8),
                 canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x60C5, 0), 0x4E20),
@@ -500,18 +468,10 @@ pub static NETWORK: Network = Network {
                         canmaster::pdo::MappingEntry::new(0x6064, 0, 32),
                     ],
                 },
-                canmaster::network::Pdo {
-                    number: 2,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x606C, 0, 32),
-                        canmaster::pdo::MappingEntry::new(0x6077, 0, 16),
-                    ],
-                },
             ],
             start_values: &[
                 canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x6060, 0), 0x3),
-                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x60C2, 1), 0xA),
+                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x60C2, 1), 0x2),
                 canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x607F, 0), 0xBB8),
                 canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x6080, 0), 0xBB8),
                 canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x60C5, 0), 0x4E20),
@@ -577,18 +537,10 @@ pub static NETWORK: Network = Network {
                         canmaster::pdo::MappingEntry::new(0x6064, 0, 32),
                     ],
                 },
-                canmaster::network::Pdo {
-                    number: 2,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x606C, 0, 32),
-                        canmaster::pdo::MappingEntry::new(0x6077, 0, 16),
-                    ],
-                },
             ],
             start_values: &[
                 canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x6060, 0), 0x3),
-                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x60C2, 1), 0xA),
+                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x60C2, 1), 0x2),
                 canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x607F, 0), 0xBB8),
                 canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x6080, 0), 0xBB8),
                 canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x60C5, 0), 0x4E20),

@@ -218,12 +218,12 @@ mod tests {
             (ms(limits.struck), ms(limits.others))
         };
         // 2200 rpm at 3000 rpm/s and 100 ms; at 10 000 rpm/s and 100 ms.
-        assert_eq!(of(Cause::DriveDisabled), ((0, 7000), (32, 865)));
-        assert_eq!(of(Cause::TpdosMissing), ((60, 893), (60, 893)));
-        assert_eq!(of(Cause::HeartbeatLost), ((282, 1115), (282, 1115)));
-        assert_eq!(of(Cause::DriveCutOff), ((212, 532), (60, 893)));
-        assert_eq!(of(Cause::MasterReset), ((212, 532), (212, 532)));
-        assert_eq!(of(Cause::MasterHangs), ((327, 647), (327, 647)));
+        assert_eq!(of(Cause::DriveDisabled), ((0, 7000), (8, 841)));
+        assert_eq!(of(Cause::TpdosMissing), ((12, 845), (12, 845)));
+        assert_eq!(of(Cause::HeartbeatLost), ((258, 1091), (258, 1091)));
+        assert_eq!(of(Cause::DriveCutOff), ((204, 524), (12, 845)));
+        assert_eq!(of(Cause::MasterReset), ((204, 524), (204, 524)));
+        assert_eq!(of(Cause::MasterHangs), ((319, 639), (319, 639)));
     }
 
     #[test]

@@ -170,7 +170,7 @@ fn signed(field: &[u8]) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use canmaster::network::sample::SIX_EPOS4;
+    use canmaster::network::sample::SIX_EPOS4_10_MS as SIX_EPOS4;
 
     fn record(ms: u64, id: u16, data: &[u8]) -> WireRecord {
         WireRecord {

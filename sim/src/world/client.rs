@@ -97,8 +97,16 @@ impl<'i> Client<'i> {
         Some(frame)
     }
 
+    /// Sends a frame of a transfer as soon as there is room.
+    fn send(&mut self, frame: Frame) {
+        while !self.world.say(WireFrame::from(frame)) {
+            let next = self.world.now() + LOOK;
+            self.world.run_until(next);
+        }
+    }
+
     fn finish(&mut self, first: Frame, data: &mut Data) -> Result<Transfer, SdoError> {
-        self.say(first);
+        self.send(first);
         loop {
             let next = self.world.now() + LOOK;
             self.world.run_until(next);
@@ -113,11 +121,11 @@ impl<'i> Client<'i> {
                 };
                 match progress {
                     Progress::Nothing => {}
-                    Progress::Send(frame) => self.say(frame),
+                    Progress::Send(frame) => self.send(frame),
                     Progress::Done(transfer) => return Ok(transfer),
                     Progress::Failed(error, abort) => {
                         if let Some(abort) = abort {
-                            self.say(abort);
+                            self.send(abort);
                         }
                         return Err(error);
                     }

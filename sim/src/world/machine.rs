@@ -5,14 +5,12 @@ use std::path::Path;
 use std::sync::LazyLock;
 
 use canmaster::motion::experiment::Motor;
+use canmaster::network::Network;
 use canmaster::network::sample::SIX_EPOS4;
-use canmaster::network::{ConfigWrite, Identity, Master, Network, Node, Pdo};
-use canmaster::pdo::{MappingEntry, Transmission};
-use canmaster::time::Duration;
-use canmaster::{NodeId, id::Address};
 use canmaster_network::model;
 use canmaster_network::program::{self, Axis, Group, Program};
 
+use super::library::{self, LibraryError};
 use crate::judge::{Assignment, Part, Traffic};
 use crate::time::Time;
 
@@ -29,6 +27,9 @@ pub enum MachineError {
     /// One SYNC tick drives all buses.
     #[error("the buses have different cycles: give all of them the same cycle_us")]
     Cycles,
+    /// The description was not checked.
+    #[error(transparent)]
+    Library(#[from] LibraryError),
 }
 
 /// One bus of a machine.
@@ -102,7 +103,7 @@ impl Machine {
         {
             return Err(MachineError::Cycles);
         }
-        let network = network(described).ok_or_else(none)?;
+        let network = library::network(described)?;
         let group = Group::of(described).filter(|group| !group.axes.is_empty());
         let group = group.filter(|group| group.axes.len() <= AXES_MAX);
         let (Some(group), Some(program)) = (group, &described.program) else {
@@ -110,7 +111,7 @@ impl Machine {
         };
         let (moves, round_trip) = course(program, &group);
         Ok(Machine {
-            network: Box::leak(Box::new(network)),
+            network,
             segments: segments(described),
             motors,
             moves,
@@ -208,10 +209,6 @@ fn motor(node: &model::Node) -> Option<Motor> {
     })
 }
 
-fn leak<T>(items: impl Iterator<Item = T>) -> &'static [T] {
-    Box::leak(items.collect())
-}
-
 /// The buses of a description.
 fn segments(described: &model::Machine) -> Vec<Segment> {
     let buses = described.buses.iter().enumerate();
@@ -236,67 +233,6 @@ fn sample_segment() -> Segment {
         controller: 0,
         bit_rate: SIX_EPOS4.bit_rate,
         axes: (0..SIX_EPOS4.nodes.len()).collect(),
-    }
-}
-
-/// The description as the library has it.
-fn network(described: &model::Machine) -> Option<Network> {
-    let bus = described.buses.first()?;
-    let master = &described.master;
-    let nodes: Option<Vec<Node>> = described.nodes.iter().map(node).collect();
-    Some(Network {
-        bit_rate: bus.bit_rate,
-        cycle: Duration::from_micros(bus.cycle_us),
-        master: Master {
-            node: NodeId::new(master.node_id)?,
-            heartbeat: Duration::from_millis(master.heartbeat_ms.into()),
-            silence: Duration::from_millis(master.silence_ms),
-            boot_time: Duration::from_millis(master.boot_time_ms),
-            sdo_tries: master.sdo_tries,
-            syncs_before_start: master.syncs_before_start,
-        },
-        nodes: leak(nodes?.into_iter()),
-    })
-}
-
-fn node(node: &model::Node) -> Option<Node> {
-    let identity = &node.identity;
-    Some(Node {
-        id: NodeId::new(node.id)?,
-        name: Box::leak(node.name.clone().into_boxed_str()),
-        mandatory: node.mandatory,
-        identity: Identity {
-            device_type: identity.device_type,
-            vendor: identity.vendor,
-            product: identity.product,
-            revision: identity.revision,
-            serial: identity.serial,
-        },
-        heartbeat_ms: node.heartbeat_ms,
-        consumer_ms: node.master_timeout_ms,
-        rpdos: leak(node.rpdos.iter().map(pdo)),
-        tpdos: leak(node.tpdos.iter().map(pdo)),
-        start_values: leak(node.start_values.iter().map(write)),
-        sdo_timeout: Duration::from_millis(node.sdo_timeout_ms),
-        configured: node.configured,
-    })
-}
-
-fn pdo(pdo: &model::Pdo) -> Pdo {
-    let entry = |entry: &model::Mapped| MappingEntry(entry.word());
-    Pdo {
-        number: pdo.number,
-        transmission: Transmission::from_code(pdo.transmission),
-        mapping: leak(pdo.mapping.iter().map(entry)),
-    }
-}
-
-fn write(write: &model::Write) -> ConfigWrite {
-    let at = Address::new(write.at.index, write.at.sub);
-    match write.bytes {
-        1 => ConfigWrite::u8(at, write.value as u8),
-        2 => ConfigWrite::u16(at, write.value as u16),
-        _ => ConfigWrite::u32(at, write.value),
     }
 }
 

@@ -5,6 +5,7 @@ mod bench;
 mod client;
 mod guest;
 mod image;
+pub mod library;
 mod line;
 mod machine;
 mod operator;

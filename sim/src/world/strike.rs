@@ -16,6 +16,7 @@ use crate::board::irqs;
 use crate::bus::BusFault;
 use crate::drive::cia402::State;
 use crate::drive::{DriveFault, Trouble};
+use crate::judge::verdict::stop_tolerance;
 use crate::judge::{Cause, Limits, Reaction, STANDSTILL_RPM};
 use crate::time::Time;
 
@@ -164,6 +165,11 @@ impl Strike {
         }
     }
 
+    /// Whether only a machine knows of it whose drives send heartbeats in operational.
+    pub fn wants_heartbeats(&self) -> bool {
+        self.cause == Cause::HeartbeatLost
+    }
+
     /// Does it to a machine of its own, and watches what comes of it.
     ///
     /// # Errors
@@ -308,10 +314,10 @@ impl Strike {
         };
         let apart = reached.iter().max().zip(reached.iter().min());
         let apart = apart.map(|(last, first)| last.since(*first));
-        let cycle = Time::from(world.machine().network().cycle);
+        let together = stop_tolerance(Time::from(world.machine().network().cycle));
         must(
             world,
-            apart.is_none_or(|apart| apart <= cycle),
+            apart.is_none_or(|apart| apart <= together),
             &format!(
                 "the axes come to rest {} ms apart",
                 apart.unwrap_or(Time::ZERO).as_ms()

@@ -1,5 +1,6 @@
 //! The image that the tests boot.
 
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::LazyLock;
@@ -12,17 +13,18 @@ const VARIABLE: &str = "CANMASTER_ELF";
 /// The firmware image, built if nobody has built it.
 pub(crate) fn image() -> &'static Image {
     static IMAGE: LazyLock<Image> = LazyLock::new(|| {
-        let path = std::env::var_os(VARIABLE).map_or_else(build, PathBuf::from);
+        let path = std::env::var_os(VARIABLE).map_or_else(|| build(&[]), PathBuf::from);
         Image::read(&path).unwrap_or_else(|error| panic!("{error}"))
     });
     &IMAGE
 }
 
-/// Has xtask build the image; it says where.
-fn build() -> PathBuf {
+/// Has xtask build an image; it says where.
+pub(crate) fn build(options: &[&OsStr]) -> PathBuf {
     let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let output = Command::new(env!("CARGO"))
         .args(["xtask", "build"])
+        .args(options)
         .current_dir(workspace)
         .output()
         .expect("cargo can be started");

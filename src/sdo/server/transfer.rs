@@ -38,7 +38,7 @@ impl Transfer {
     /// size.
     pub(super) fn open_download(
         &mut self,
-        od: &impl ObjectDictionary,
+        od: &mut impl ObjectDictionary,
         at: Address,
         size: Option<u32>,
     ) -> Result<(), AbortCode> {
@@ -64,7 +64,8 @@ impl Transfer {
             self.size = od.read(at, 0, &mut [])?.size;
         } else {
             let value = od.get(at)?;
-            self.size = Some(read_bytes(value.bytes(), 0, &mut self.value).len as u32);
+            self.size = Some(value.len().into());
+            self.value = value.padded();
         }
         Ok(())
     }

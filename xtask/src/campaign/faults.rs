@@ -53,15 +53,31 @@ struct Figures {
     recovered: bool,
 }
 
+/// What is struck.
+pub(super) struct Images {
+    pub(super) sample: Image,
+    /// For what only a missing heartbeat shows.
+    pub(super) with_heartbeats: Image,
+}
+
+impl Images {
+    fn of(&self, strike: &Strike) -> &Image {
+        match strike.wants_heartbeats() {
+            true => &self.with_heartbeats,
+            false => &self.sample,
+        }
+    }
+}
+
 /// Runs all seeds and tells what came of them.
-pub(super) fn command(image: &Image, seeds: u64, workers: usize, json: bool) -> Result<ExitCode> {
+pub(super) fn command(images: &Images, seeds: u64, workers: usize, json: bool) -> Result<ExitCode> {
     let started = Instant::now();
     let all: Vec<u64> = (1..=seeds).collect();
     let bar = super::progress(all.len());
     let runs = pool::run(
         &all,
         workers,
-        |seed| Row::new(image, *seed),
+        |seed| Row::new(images, *seed),
         |row: &Row| {
             bar.inc(1);
             if !row.ok {
@@ -104,11 +120,11 @@ pub(super) fn command(image: &Image, seeds: u64, workers: usize, json: bool) -> 
 }
 
 impl Row {
-    fn new(image: &Image, seed: u64) -> Row {
+    fn new(images: &Images, seed: u64) -> Row {
         let started = Instant::now();
-        let nodes = image.machine().network().nodes;
+        let nodes = images.sample.machine().network().nodes;
         let strike = Strike::random(seed, nodes.len());
-        let outcome = strike.run(image, seed);
+        let outcome = strike.run(images.of(&strike), seed);
         Row {
             seed,
             ok: outcome.is_ok(),

@@ -13,10 +13,12 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
 use crate::bench::realtime::{CASES, Order};
+use crate::cargo;
 use crate::cli::CampaignOptions;
 use crate::machine::Checked;
 use crate::networks::{self, Variant};
 use crate::table;
+use faults::Images;
 use job::{Job, Row};
 
 /// Seeds, where none are given.
@@ -42,7 +44,12 @@ pub(crate) fn command(options: &CampaignOptions) -> Result<ExitCode> {
     let workers = options.jobs.map_or_else(pool::cores, |jobs| jobs as usize);
     if options.faults {
         let seeds = options.seeds.unwrap_or(FAULTS);
-        return faults::command(&image, seeds, workers, options.json);
+        let unhurried = cargo::workspace().join(networks::UNHURRIED);
+        let images = Images {
+            sample: image,
+            with_heartbeats: Checked::read(Some(&unhurried))?.built()?,
+        };
+        return faults::command(&images, seeds, workers, options.json);
     }
     let seeds = options.seeds.unwrap_or(SEEDS);
     let end = Time::from_secs_f64(options.seconds);

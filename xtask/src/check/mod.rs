@@ -10,10 +10,11 @@ use anyhow::{Context, Result};
 use canmaster_network::derive::{concise_dcf, dbc, picture};
 use canmaster_network::layout::{Layout, SlotKind};
 use canmaster_network::model::{Bus, Machine};
+use canmaster_sim::world::library;
 
 use crate::cli::CheckOptions;
 use crate::machine::{Description, counted};
-use crate::{board_eds, cargo, library, report, table};
+use crate::{board_eds, cargo, report, table};
 
 /// Letters of the picture of a cycle.
 const WIDTH: usize = 72;
@@ -157,7 +158,7 @@ fn derived(machine: &Machine, folder: &Path) -> Result<()> {
     fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     for (place, bus) in machine.buses.iter().enumerate() {
         write(format!("{}.dbc", bus.name), dbc(machine, place).as_bytes())?;
-        let network = library::network(machine, place)?;
+        let network = library::network_of_bus(machine, place)?;
         let eds = board_eds::eds(machine, place, network);
         write(format!("{}-master.eds", bus.name), eds.write().as_bytes())?;
     }

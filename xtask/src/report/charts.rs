@@ -6,9 +6,13 @@ use canmaster_sim::time::Time;
 use plotters::chart::MeshStyle;
 use plotters::coord::Shift;
 use plotters::coord::ranged1d::{Ranged, ValueFormatter};
+use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
 use super::frames::Lane;
+
+/// Two scales with curves between them.
+type Plot<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
 /// One colour per axis, told apart by colour-blind people too (after Okabe and
 /// Ito); they repeat after six.
@@ -142,9 +146,7 @@ pub(super) fn over_time(
             series
                 .map_err(drawing)?
                 .label(&curve.label)
-                .legend(move |(x, y)| {
-                    PathElement::new(vec![(x, y), (x + 18, y)], colour.stroke_width(3))
-                });
+                .legend(swatch(colour));
         }
         let at = |axis: usize, at: Time| {
             let curve = curves.get(axis)?;
@@ -160,15 +162,25 @@ pub(super) fn over_time(
             let end = at(span.axis, span.end.at).map(|c| Circle::new(c, 4, colour.filled()));
             chart.draw_series(end).map_err(drawing)?;
         }
-        chart
-            .configure_series_labels()
-            .position(SeriesLabelPosition::UpperLeft)
-            .background_style(WHITE.mix(0.85))
-            .border_style(FAINT)
-            .label_font((FONT, 13).into_font().color(&INK))
-            .draw()
-            .map_err(drawing)
+        legend(&mut chart)
     })
+}
+
+/// A piece of a curve, for the legend.
+pub(super) fn swatch(colour: RGBColor) -> impl Fn((i32, i32)) -> PathElement<(i32, i32)> {
+    move |(x, y)| PathElement::new(vec![(x, y), (x + 18, y)], colour.stroke_width(3))
+}
+
+/// Which curve is which.
+pub(super) fn legend<'a>(chart: &mut Plot<'a, 'a>) -> Result<()> {
+    chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::UpperLeft)
+        .background_style(WHITE.mix(0.85))
+        .border_style(FAINT)
+        .label_font((FONT, 13).into_font().color(&INK))
+        .draw()
+        .map_err(drawing)
 }
 
 /// A curve's points, thinned out to what can be seen.

@@ -3,7 +3,7 @@
 use anyhow::Result;
 use plotters::prelude::*;
 
-use super::charts::{COLOURS, FAINT, FONT, INK, drawing, style, svg};
+use super::charts::{COLOURS, drawing, legend, style, svg, swatch};
 
 /// One curve.
 pub(crate) struct Curve {
@@ -42,19 +42,10 @@ pub(crate) fn lines(x: &str, y: &str, curves: &[Curve]) -> Result<String> {
                 .draw_series(LineSeries::new(points(), colour.stroke_width(2)))
                 .map_err(drawing)?
                 .label(&curve.name)
-                .legend(move |(x, y)| {
-                    PathElement::new(vec![(x, y), (x + 18, y)], colour.stroke_width(3))
-                });
+                .legend(swatch(colour));
             let dots = points().map(|point| Circle::new(point, 4, colour.filled()));
             chart.draw_series(dots).map_err(drawing)?;
         }
-        chart
-            .configure_series_labels()
-            .position(SeriesLabelPosition::UpperLeft)
-            .background_style(WHITE.mix(0.85))
-            .border_style(FAINT)
-            .label_font((FONT, 13).into_font().color(&INK))
-            .draw()
-            .map_err(drawing)
+        legend(&mut chart)
     })
 }

@@ -1,0 +1,310 @@
+//! The group led over CAN: a client on the bus enables, releases, moves and stops it by
+//! SDO, changes modes, loads a program and follows it by the board's own TPDOs.
+
+mod common;
+
+use canmaster::id::Address;
+use canmaster::motion::{GroupState, panel};
+use canmaster::sdo::{AbortCode, Protocol, SdoError};
+use canmaster::{CobId, Frame, NodeId};
+use canmaster_network::Source;
+use canmaster_sim::time::Time;
+use canmaster_sim::world::{Client, Scenario, World, enabled};
+
+use common::image;
+
+const MASTER: NodeId = NodeId::constant::<127>();
+const END: Time = Time::from_ms(60_000);
+const AXES: u8 = 6;
+
+const ENABLE: u32 = 1;
+const DISABLE: u32 = 2;
+const RELEASE: u32 = 3;
+const STOP: u32 = 4;
+const SET_MODES: u32 = 9;
+const START: u32 = 10;
+const RUN: u32 = 12;
+
+fn client(scenario: Scenario) -> Client<'static> {
+    let world = World::new(image(), scenario.unattended()).unwrap();
+    Client::new(world, MASTER)
+}
+
+fn in_standby(seed: u64) -> Client<'static> {
+    let mut client = client(Scenario::new(seed, END));
+    assert!(client.world.run_to(Time::from_ms(4000), all_enabled));
+    until(&mut client, GroupState::Standby);
+    client
+}
+
+fn all_enabled(world: &World<'_>) -> bool {
+    world.statuses().flatten().all(|status| enabled(&status))
+}
+
+fn command(client: &mut Client<'_>, command: u32) -> Result<(), SdoError> {
+    client.put(panel::COMMAND, 0, command, 2)
+}
+
+fn state(client: &mut Client<'_>) -> u32 {
+    client.number(panel::STATE, 0).unwrap()
+}
+
+#[track_caller]
+fn until(client: &mut Client<'_>, wanted: GroupState) {
+    for _ in 0..1000 {
+        if state(client) == wanted as u32 {
+            return;
+        }
+        client.listen(Time::from_ms(5));
+    }
+    panic!("{wanted} is not reached: {}", state(client));
+}
+
+/// Refused, and why: 2002h.
+#[track_caller]
+fn refused(client: &mut Client<'_>, done: Result<(), SdoError>, code: AbortCode, why: u32) {
+    match done {
+        Err(SdoError::Aborted { code: told, .. }) => assert_eq!(told, code),
+        other => panic!("{other:?}"),
+    }
+    let told = client.number(panel::REFUSAL, 0).unwrap();
+    assert_eq!(format!("{told:08X}"), format!("{why:08X}"));
+}
+
+fn positions(client: &mut Client<'_>) -> Vec<i32> {
+    let mut all = Vec::new();
+    for axis in 1..=AXES {
+        all.push(client.number(panel::POSITION, axis).unwrap() as i32);
+    }
+    all
+}
+
+fn put_targets(client: &mut Client<'_>, target: i32) {
+    for axis in 1..=AXES {
+        client.put(panel::TARGET, axis, target as u32, 4).unwrap();
+        client.put(panel::VELOCITY, axis, 1200, 4).unwrap();
+        client.put(panel::ACCELERATION, axis, 2000, 4).unwrap();
+    }
+}
+
+#[track_caller]
+fn arrived(client: &mut Client<'_>, from: &[i32], way: i32) {
+    for (now, from) in positions(client).iter().zip(from) {
+        assert!((now - from - way).abs() <= 3, "{now} from {from}");
+    }
+}
+
+#[test]
+fn enable_release_move_and_stop_by_sdo() {
+    let mut client = in_standby(41);
+    let from = positions(&mut client);
+    put_targets(&mut client, 6000);
+    // Nothing moves before a release.
+    let standby = 0xFF01_0000 | GroupState::Standby as u32;
+    let done = command(&mut client, START);
+    refused(&mut client, done, AbortCode::DEVICE_STATE, standby);
+    command(&mut client, RELEASE).unwrap();
+    until(&mut client, GroupState::Moving);
+    command(&mut client, START).unwrap();
+    client.listen(Time::from_ms(1500));
+    arrived(&mut client, &from, 6000);
+    // Stopped on the way, all axes come to rest.
+    put_targets(&mut client, 40_000);
+    command(&mut client, START).unwrap();
+    client.listen(Time::from_ms(600));
+    command(&mut client, STOP).unwrap();
+    until(&mut client, GroupState::Standby);
+    let rest = positions(&mut client);
+    client.listen(Time::from_ms(300));
+    arrived(&mut client, &rest, 0);
+    assert!(rest[0] - from[0] < 35_000 && rest[0] - from[0] > 6000);
+    command(&mut client, DISABLE).unwrap();
+    until(&mut client, GroupState::Idle);
+    assert!(
+        !client
+            .world
+            .statuses()
+            .flatten()
+            .any(|status| enabled(&status))
+    );
+    command(&mut client, ENABLE).unwrap();
+    until(&mut client, GroupState::Standby);
+    assert!(all_enabled(&client.world));
+}
+
+#[test]
+fn a_mode_is_changed_at_standstill_and_confirmed() {
+    let mut client = in_standby(42);
+    for axis in 1..=AXES {
+        client.put(panel::MODE, axis, 8, 1).unwrap();
+    }
+    // Not while the group is released.
+    command(&mut client, RELEASE).unwrap();
+    until(&mut client, GroupState::Moving);
+    let moving = 0xFF01_0000 | GroupState::Moving as u32;
+    let done = command(&mut client, SET_MODES);
+    refused(&mut client, done, AbortCode::DEVICE_STATE, moving);
+    command(&mut client, STOP).unwrap();
+    until(&mut client, GroupState::Standby);
+    command(&mut client, SET_MODES).unwrap();
+    client.listen(Time::from_ms(500));
+    until(&mut client, GroupState::Standby);
+    assert!(
+        client
+            .world
+            .statuses()
+            .flatten()
+            .all(|status| status.mode == 8)
+    );
+    for axis in 1..=AXES {
+        assert_eq!(client.number(panel::MODE, axis), Ok(8));
+    }
+    // RPDO3 carries the target position, RPDO1 is not sent any more.
+    let from = positions(&mut client);
+    put_targets(&mut client, 5000);
+    command(&mut client, RELEASE).unwrap();
+    until(&mut client, GroupState::Moving);
+    client.take_heard();
+    command(&mut client, START).unwrap();
+    client.listen(Time::from_ms(1500));
+    assert!(client.heard_from(0x201).is_empty());
+    arrived(&mut client, &from, 5000);
+}
+
+#[test]
+fn what_a_drive_lacks_or_a_missing_one_forbids_is_refused() {
+    let mut client = in_standby(43);
+    // No drive has interpolated position mode.
+    let done = client.put(panel::MODE, 3, 7, 1);
+    refused(&mut client, done, AbortCode::VALUE_RANGE, 0x0306_0007);
+    let done = client.put(panel::AXES, 0, 0x7F, 4);
+    refused(&mut client, done, AbortCode::VALUE_RANGE, 0xFF08_007F);
+
+    let mut client = self::client(Scenario::new(44, END).without(NodeId::constant::<3>()));
+    client.listen(Time::from_ms(4000));
+    assert_eq!(state(&mut client), GroupState::Idle as u32);
+    for order in [RELEASE, RUN] {
+        let done = command(&mut client, order);
+        refused(&mut client, done, AbortCode::DEVICE_STATE, 0xFF01_0000);
+    }
+    assert!(
+        !client
+            .world
+            .statuses()
+            .flatten()
+            .any(|status| enabled(&status))
+    );
+}
+
+#[test]
+fn the_group_is_followed_by_the_boards_own_tpdos() {
+    let mut client = in_standby(45);
+    client.listen(Time::from_ms(200));
+    for id in [0x1FF, 0x2FF, 0x3FF, 0x4FF] {
+        assert!(client.heard_from(id).is_empty(), "off");
+    }
+    for n in 0..4 {
+        let id = client.number(0x1800 + n, 1).unwrap();
+        assert_eq!(id & 0x8000_0000, 0x8000_0000);
+        client.put(0x1800 + n, 2, 20, 1).unwrap();
+        client.put(0x1800 + n, 1, id & 0x7FFF_FFFF, 4).unwrap();
+    }
+    client.take_heard();
+    client.listen(Time::from_ms(2000));
+    let heard = client.take_heard();
+    let syncs = heard.iter().filter(|(_, frame)| frame.id() == CobId::SYNC);
+    let expected = syncs.count() / 20;
+    let of = |id: u16| -> Vec<Frame> {
+        let all = heard.iter().map(|(_, frame)| *frame);
+        all.filter(|frame| frame.id().get() == id).collect()
+    };
+    for id in [0x1FF, 0x2FF, 0x3FF, 0x4FF] {
+        let count = of(id).len();
+        assert!(
+            count.abs_diff(expected) <= 1,
+            "{id:X}h: {count} of {expected}"
+        );
+    }
+    // State and step; positions of axes 1 and 2.
+    let standby = GroupState::Standby as u8;
+    assert!(
+        of(0x1FF)
+            .iter()
+            .all(|frame| frame.data() == [standby, 0, 0])
+    );
+    let all = positions(&mut client);
+    let mut bytes = all[0].to_le_bytes().to_vec();
+    bytes.extend(all[1].to_le_bytes());
+    let near = |frame: &Frame| {
+        let data: [u8; 8] = frame.data().try_into().unwrap();
+        let first = i32::from_le_bytes(data[..4].try_into().unwrap());
+        let second = i32::from_le_bytes(data[4..].try_into().unwrap());
+        (first - all[0]).abs() <= 2 && (second - all[1]).abs() <= 2
+    };
+    assert!(of(0x2FF).iter().all(near));
+    // More often than the cycle has room for.
+    let result = client.write(Address::new(0x1800, 2), &[0], Protocol::Normal);
+    assert!(result.is_err());
+}
+
+/// What was read from 200Fh is a program: written again it runs; damaged it is refused.
+#[test]
+fn a_program_is_downloaded_by_block_and_segmented_transfer_and_run() {
+    let mut client = in_standby(46);
+    let program = Address::new(panel::PROGRAM, 0);
+    let bytes = client.read(program, Protocol::Block).unwrap();
+    assert!(bytes.len() > 100, "{}", bytes.len());
+    let mut damaged = bytes.clone();
+    damaged[20] ^= 1;
+    for protocol in [Protocol::Block, Protocol::Normal] {
+        let done = client.write(program, &damaged, protocol);
+        assert!(
+            matches!(done, Err(SdoError::Aborted { code, .. }) if code == AbortCode::VALUE_RANGE)
+        );
+        assert_eq!(
+            client.number(panel::REFUSAL, 0).unwrap() >> 16,
+            0xFF14,
+            "checksum"
+        );
+        client.write(program, &bytes, protocol).unwrap();
+        assert_eq!(client.read(program, protocol), Ok(bytes.clone()));
+    }
+    let long = vec![0; 1000];
+    let done = client.write(program, &long, Protocol::Block);
+    assert!(matches!(done, Err(SdoError::Aborted { code, .. }) if code == AbortCode::TOO_LONG));
+    let another = compiled(
+        "unit = \"turns\"\nvelocity = 1000\nacceleration = 2000\n\
+         [[step]]\n[[step.move]]\naxes = [\"axis 2\"]\nto = 3\n",
+    );
+    client.write(program, &another, Protocol::Block).unwrap();
+    assert_eq!(client.read(program, Protocol::Normal), Ok(another.clone()));
+    let from = positions(&mut client);
+    command(&mut client, RUN).unwrap();
+    until(&mut client, GroupState::Moving);
+    assert_eq!(client.number(panel::STEP, 0), Ok(1));
+    // Not while it runs.
+    let moving = 0xFF01_0000 | GroupState::Moving as u32;
+    let done = client.write(program, &bytes, Protocol::Block);
+    refused(&mut client, done, AbortCode::DEVICE_STATE, moving);
+    until(&mut client, GroupState::Standby);
+    for ((axis, from), now) in (1..).zip(&from).zip(positions(&mut client)) {
+        let way = if axis == 2 { 6000 } else { 0 };
+        assert!(
+            (now - from - way).abs() <= 3,
+            "axis {axis}: {now} from {from}"
+        );
+    }
+}
+
+/// The bytes of a program in TOML for the sample.
+fn compiled(text: &str) -> Vec<u8> {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../network.toml");
+    let machine = canmaster_network::load(file.as_ref()).machine.unwrap();
+    let source = Source::new("one.toml", text.as_bytes());
+    let outcome = canmaster_network::program::read(&source, &machine);
+    let problems: Vec<String> = outcome.problems.iter().map(ToString::to_string).collect();
+    let program = outcome.program;
+    program
+        .unwrap_or_else(|| panic!("{}", problems.join("\n")))
+        .bytes()
+}
