@@ -5,8 +5,9 @@
 //! sine or a table and a stop are all such pieces.
 //!
 //! From SYNC to SYNC a piece costs three additions: the forward differences of a
-//! cubic. Their rounding, at most a 64th of an increment in pieces of up to
-//! 10 000 cycles, is taken up by the next piece and by the last knot exactly.
+//! cubic. Their rounding, that of single precision over the way of a ramp (a tenth of
+//! an increment in a million), is taken up by the next piece and by the last knot
+//! exactly.
 
 use super::fixed::{self, MORE};
 

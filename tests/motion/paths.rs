@@ -35,17 +35,18 @@ fn path(from: Point, knots: &[Knot]) -> Path {
 fn points(from: Point, knots: &[Knot]) -> Vec<(f64, f64, f64)> {
     let mut path = path(from, knots);
     let mut all = Vec::new();
-    let mut whole = 0.0;
+    // Summed exactly.
+    let mut whole = 0i64;
     let mut last = from.position;
     // Its first piece begins with the first step.
     let mut speed = from.velocity as f64 / ONE;
     all.push((0.0, speed, f64::from(from.acceleration)));
     loop {
         let point = path.advance();
-        whole += point.position.wrapping_sub(last) as f64 / ONE;
+        whole += point.position.wrapping_sub(last);
         last = point.position;
         speed = point.velocity as f64 / ONE;
-        all.push((whole, speed, f64::from(point.acceleration)));
+        all.push((whole as f64 / ONE, speed, f64::from(point.acceleration)));
         if path.is_over() {
             assert!(!path.is_dry());
             return all;
@@ -221,7 +222,10 @@ proptest! {
         let [a, b] = [0, 1].map(|n| points(legs[n].as_ref().unwrap().from, &knots[n]));
         let way = |n: usize| f64::from(legs[n].as_ref().unwrap().target.wrapping_sub(1000));
         for (a, b) in a.iter().zip(&b) {
-            prop_assert!((a.0 * way(1) - b.0 * way(0)).abs() <= 0.1 * (way(0).abs() + way(1).abs()) + 0.1);
+            // Single precision over the way of a ramp.
+            let rounding = 2.4e-7 * (way(0) * way(1)).abs();
+            let most = 0.1 * (way(0).abs() + way(1).abs()) + 0.1 + rounding;
+            prop_assert!((a.0 * way(1) - b.0 * way(0)).abs() <= most);
         }
     }
 

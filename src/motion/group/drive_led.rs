@@ -33,8 +33,8 @@ enum Phase {
     Done,
     /// To be asked of the drive as soon as it can take it.
     Asked,
-    /// Bit 4 is set; so many fresh TPDOs since.
-    Set(u8),
+    /// Bit 4 is set.
+    Set,
     /// The drive took it; bit 4 is low again.
     Taken,
     /// The drive moves.
@@ -44,6 +44,8 @@ enum Phase {
 /// What one axis has asked of its drive.
 pub(super) struct DriveLed {
     phase: Phase,
+    /// Fresh TPDOs since bit 4 was set.
+    seen: u8,
     /// Cycles since it was asked, or since the drive took the set-point.
     waited: u32,
     /// Cycles in which homing has to end.
@@ -57,6 +59,7 @@ impl DriveLed {
     pub(super) const fn new() -> DriveLed {
         DriveLed {
             phase: Phase::Done,
+            seen: 0,
             waited: 0,
             limit: 0,
             target: 0,
@@ -90,45 +93,39 @@ impl DriveLed {
     /// Bits 4 to 6 and 8 of the controlword.
     pub(super) fn bits(&self, halt: bool) -> u16 {
         let begun = match self.phase {
-            Phase::Set(_) => BEGIN | self.flags,
+            Phase::Set => BEGIN | self.flags,
             _ => 0,
         };
         ControlWord(begun).with_halt(halt).0
     }
 
-    /// Takes in a fresh statusword.
-    pub(super) fn hear(
-        &mut self,
-        mode: Mode,
-        status: Option<StatusWord>,
-    ) -> Result<(), FaultCause> {
+    /// Takes in a statusword, if a fresh one came. `false`: it reports that homing
+    /// failed.
+    pub(super) fn hear(&mut self, mode: Mode, status: Option<StatusWord>) -> bool {
         self.waited = self.waited.saturating_add(1);
         let Some(status) = status else {
-            return Ok(());
+            return true;
         };
-        if mode == Mode::ProfilePosition {
-            self.phase = match (self.phase, status.mode_bit_12()) {
-                (Phase::Asked, false) => Phase::Set(0),
-                (Phase::Set(_), true) => Phase::Taken,
-                (Phase::Taken, false) => {
-                    self.waited = 0;
-                    Phase::Running
-                }
-                (Phase::Running, false) if status.target_reached() => Phase::Done,
-                (phase, _) => phase,
-            };
-            return Ok(());
-        }
-        self.phase = match self.phase {
-            Phase::Asked => Phase::Set(0),
-            Phase::Set(seen) if seen < SEEN_AFTER => Phase::Set(seen + 1),
-            Phase::Set(_) if status.mode_bit_13() => {
-                return Err(FaultCause::DriveError { status });
+        let (flag, reached) = (status.mode_bit_12(), status.target_reached());
+        let homing = mode != Mode::ProfilePosition;
+        match self.phase {
+            Phase::Asked if homing || !flag => {
+                self.phase = Phase::Set;
+                self.seen = 0;
             }
-            Phase::Set(_) if status.mode_bit_12() && status.target_reached() => Phase::Done,
-            phase => phase,
-        };
-        Ok(())
+            Phase::Set if !homing && flag => self.phase = Phase::Taken,
+            Phase::Set if !homing => {}
+            Phase::Set if self.seen < SEEN_AFTER => self.seen += 1,
+            Phase::Set if status.mode_bit_13() => return false,
+            Phase::Set if flag && reached => self.phase = Phase::Done,
+            Phase::Taken if !flag => {
+                self.waited = 0;
+                self.phase = Phase::Running;
+            }
+            Phase::Running if !flag && reached => self.phase = Phase::Done,
+            _ => {}
+        }
+        true
     }
 
     /// Whether it is done; an error if a handshake takes more than `limit` cycles,

@@ -51,14 +51,15 @@ impl<const N: usize> Group<N> {
         config: &GroupConfig<N>,
     ) -> Option<FaultCause> {
         let (axis, limits) = (self.axes.get_mut(n)?, config.axes.get(n)?);
+        let status = StatusWord(axis.feedback.statusword);
         let faulted = self.faulted & bit(n) != 0;
         let mode = axis.mode(limits);
         let (seen, by_drive) = (axis.seen, axis.seen & BY_DRIVE != 0);
         if by_drive
             && matches!(state, GroupState::Moving | GroupState::Homing)
-            && let Err(cause) = axis.led.hear(mode, axis.fresh_status())
+            && !axis.led.hear(mode, axis.fresh_status())
         {
-            return Some(cause);
+            return Some(FaultCause::DriveError { status });
         }
         if !faulted && inputs.network_ready && inputs.absent & bit(n) != 0 {
             return Some(FaultCause::LeftOperational);
@@ -76,7 +77,6 @@ impl<const N: usize> Group<N> {
         if seen & FRESH == 0 || (stops && self.excluded & bit(n) != 0) {
             return None;
         }
-        let status = StatusWord(axis.feedback.statusword);
         if seen & FAILED != 0 {
             // The first stage of enabling resets the faults of the past.
             let reset = leads && self.stage == Goal::Disabled;
