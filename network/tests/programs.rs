@@ -2,8 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use canmaster::motion::experiment::GROUP;
-use canmaster::motion::format;
+use canmaster::motion::experiment::{self, GROUP, Motor};
+use canmaster::motion::{GroupConfig, format};
+use canmaster::time::Duration;
 use canmaster_network::model::Machine;
 use canmaster_network::program::{self, Action, Group, Program};
 use canmaster_network::{Severity, Source, load, read_for_firmware};
@@ -12,9 +13,17 @@ fn workspace() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
+/// Six axes in cycles of 10 ms.
 fn sample() -> Machine {
-    load(&workspace().join("network.toml")).machine.unwrap()
+    machine("networks/one_bus_10ms.toml")
 }
+
+fn machine(file: &str) -> Machine {
+    load(&workspace().join(file)).machine.unwrap()
+}
+
+/// The same six in cycles of 2 ms, as `network.toml` has them.
+static FAST: GroupConfig<6> = experiment::group(&[Motor::SAMPLE; 6], Duration::from_millis(2), 3);
 
 fn words(problems: &[canmaster_network::Problem]) -> String {
     let words: Vec<String> = problems.iter().map(ToString::to_string).collect();
@@ -22,8 +31,12 @@ fn words(problems: &[canmaster_network::Problem]) -> String {
 }
 
 fn of_project(name: &str) -> Program {
+    for_machine(name, &sample())
+}
+
+fn for_machine(name: &str, machine: &Machine) -> Program {
     let path = workspace().join("programs").join(name);
-    let outcome = program::load(&path, &sample());
+    let outcome = program::load(&path, machine);
     assert!(outcome.problems.is_empty(), "{}", words(&outcome.problems));
     outcome.program.unwrap()
 }
@@ -49,6 +62,8 @@ fn the_programs_of_the_project_are_valid() {
     for name in names {
         let program = of_project(&name);
         assert_eq!(format::check(&program.bytes(), &GROUP), Ok(()), "{name}");
+        let fast = for_machine(&name, &machine("network.toml"));
+        assert_eq!(format::check(&fast.bytes(), &FAST), Ok(()), "{name}");
         let group = Group::of(&sample()).unwrap();
         let course = program.course(&group);
         assert!(!course.endless && course.cycles > 0, "{name}");

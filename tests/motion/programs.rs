@@ -368,8 +368,8 @@ fn a_frame_that_is_wrong_is_named() {
     for length in 0..bytes.len() {
         assert!(format::check(&bytes[..length], &GROUP).is_err());
     }
-    for at in 8..bytes.len() {
-        assert_eq!(with(at, bytes[at] ^ 0x10).0, Fault::Checksum, "{at}");
+    for (at, byte) in bytes.iter().enumerate().skip(8) {
+        assert_eq!(with(at, byte ^ 0x10).0, Fault::Checksum, "{at}");
     }
     let error = format::check(&bytes[..8], &GROUP).unwrap_err();
     assert_eq!(

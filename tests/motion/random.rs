@@ -24,8 +24,7 @@ fn watched(bytes: Vec<u8>, cycles: u32) -> Result<[i32; AXES], TestCaseError> {
     rig.run();
     let homes: [i32; AXES] = core::array::from_fn(|n| rig.group.view(n).unwrap().home);
     let mut before = [[0; 2]; AXES];
-    let mut known = 0;
-    for _ in 0..cycles {
+    for known in 0..cycles {
         rig.step(READY);
         for (n, [last, speed]) in before.iter_mut().enumerate() {
             let at = rig.commands[n].target.wrapping_sub(homes[n]);
@@ -41,7 +40,6 @@ fn watched(bytes: Vec<u8>, cycles: u32) -> Result<[i32; AXES], TestCaseError> {
             prop_assert!((lower..=upper).contains(&at));
             (*last, *speed) = (at, now);
         }
-        known += 1;
         let state = rig.group.state();
         prop_assert!(
             matches!(
