@@ -26,13 +26,17 @@ const ROUNDING: f32 = 1.0 + 1.0 / 131_072.0;
 /// the velocity, three brake.
 pub type Knots = Vec<Knot, LEG_KNOTS>;
 
-/// One axis' part of a move, in increments and cycles; limits are positive.
+/// One axis' part of a move, in increments and cycles; limits are positive. What is
+/// long stands last: the rest is reached by short instructions.
 #[derive(Clone, Debug)]
+#[repr(C)]
 pub struct Leg {
-    /// Where it begins.
-    pub from: Point,
+    /// Legs with the same number arrive together; `None`: it is not moved.
+    pub set: Option<u8>,
     /// Where it ends at rest, increments of 6064h; the shorter way around.
     pub target: i32,
+    /// Position from which the targets of its axis count.
+    pub home: i32,
     /// Increments per cycle.
     pub velocity: f32,
     /// Increments per cycle squared.
@@ -41,23 +45,25 @@ pub struct Leg {
     pub deceleration: f32,
     /// Increments per cycle cubed; 0: no limit.
     pub jerk: f32,
-    /// Legs with the same number arrive together; `None`: it is not moved.
-    pub set: Option<u8>,
-    /// What [`plan`] makes of it.
-    pub knots: Knots,
-    /// Its steepest slopes, increments per cycle squared: while its speed grows.
+    /// What [`plan`] makes of it. Its steepest slopes, increments per cycle squared:
+    /// while its speed grows.
     pub up: f32,
     /// While it shrinks.
     pub down: f32,
     /// An axis that cannot brake before its target turns around: no farther than so
     /// many increments from where it begins.
     pub turn: f32,
-    /// What [`plan`] keeps of it meanwhile.
+    /// What it keeps of it meanwhile.
     pub work: Work,
+    /// Where it begins.
+    pub from: Point,
+    /// And the knots.
+    pub knots: Knots,
 }
 
 /// A leg as the search sees it.
 #[derive(Clone, Copy, Debug)]
+#[repr(C)]
 pub struct Work {
     /// Cycles before the phases, in which the acceleration is led to 0.
     lead: u32,
@@ -73,6 +79,7 @@ impl Leg {
     pub const ZERO: Leg = Leg {
         from: Point::at_rest(0),
         target: 0,
+        home: 0,
         velocity: 0.0,
         acceleration: 0.0,
         deceleration: 0.0,

@@ -124,6 +124,7 @@ fn sizes() -> Result<()> {
 fn one_run() -> Result<()> {
     let options = RunOptions {
         machine: MachineOptions { network: None },
+        program: None,
         factory: false,
         stranger: false,
         seconds: None,

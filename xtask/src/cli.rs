@@ -102,6 +102,10 @@ pub(crate) struct MachineOptions {
 pub(crate) struct RunOptions {
     #[command(flatten)]
     pub(crate) machine: MachineOptions,
+    /// Motion program, compiled and downloaded to the running board before the
+    /// release [default: the one that is built into the image]
+    #[arg(long, value_name = "FILE", conflicts_with = "bridge")]
+    pub(crate) program: Option<PathBuf>,
     /// Simulated seconds from power-on; the program repeats whole round trips
     /// that fit [default: enough for one]
     #[arg(long, value_name = "S", value_parser = seconds)]

@@ -4,6 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
+use canmaster_network::program::{self, Program};
 use canmaster_network::{Severity, load, model};
 use canmaster_sim::world::{Image, Machine};
 
@@ -77,11 +78,38 @@ impl Checked {
     /// Checks the description in `file`; without, that of the project. What is
     /// wrong is said on standard error.
     pub(crate) fn read(file: Option<&Path>) -> Result<Checked> {
+        Checked::of(file, Description::check(file)?.machine)
+    }
+
+    /// The same, but its axes run the program in `program`, which is compiled for
+    /// them.
+    ///
+    /// # Errors
+    /// As above, and what is wrong with the program.
+    pub(crate) fn with_program(file: Option<&Path>, program: &Path) -> Result<(Checked, Program)> {
+        let mut described = Description::check(file)?.machine;
+        let outcome = program::load(program, &described);
+        for problem in &outcome.problems {
+            eprintln!("{problem}\n");
+        }
+        let is_error = |problem: &&canmaster_network::Problem| problem.severity == Severity::Error;
+        let errors = outcome.problems.iter().filter(is_error).count();
+        let Some(compiled) = outcome.program else {
+            bail!(
+                "{}: refused, {}",
+                program.display(),
+                counted(errors, "error")
+            );
+        };
+        described.program = Some(compiled.clone());
+        Ok((Checked::of(file, described)?, compiled))
+    }
+
+    fn of(file: Option<&Path>, described: model::Machine) -> Result<Checked> {
         let path = match file {
             Some(file) => Some(std::path::absolute(file).context("no current folder")?),
             None => None,
         };
-        let described = Description::check(file)?.machine;
         let machine = Machine::new(&described)?;
         Ok(Checked {
             path,

@@ -21,6 +21,7 @@ fn bad_input_ends_with_usage_and_exit_code_two() {
         &["run", "--without", "77"],
         &["run", "--log", "loud"],
         &["run", "--bridge", "65536"],
+        &["run", "--bridge", "0", "--program", "programs/sine.toml"],
         &["run", "--bridge", "localhost:2000"],
         &["run", "--fault", "3:loud"],
         &["campaign", "--seeds", "0"],
@@ -126,6 +127,18 @@ fn a_machine_that_cannot_work_is_refused_in_the_same_words_before_anything_is_bu
         assert_eq!(stderr(&assert), checked, "{command}");
         assert!(assert.get_output().stdout.is_empty(), "{command}");
     }
+}
+
+#[test]
+fn a_motion_program_is_refused_with_its_line_before_anything_is_built() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("far.toml");
+    let text = "acceleration = 1000\n[[step]]\n[[step.move]]\nto = 5\nvelocity = 5000\n";
+    std::fs::write(&file, text).unwrap();
+    let assert = xtask().args(["run", "--program"]).arg(&file).assert();
+    let words = stderr(&assert.failure());
+    assert!(words.contains("far.toml:5: `5000`: velocity of \"axis 1\" must be 1 ..= 3000 rpm"));
+    assert!(words.contains("refused, 1 error"), "{words}");
 }
 
 #[test]

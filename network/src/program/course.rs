@@ -34,8 +34,24 @@ pub struct Course {
 pub struct Stop {
     /// Increments from home.
     pub target: i32,
-    /// Axes of one set stop together.
+    /// Axes with the same number do the same, and stop together to be seen: of two
+    /// that arrive together, the one that goes less far is slow before.
     pub set: u8,
+}
+
+/// Numbers for what is alike, from 1.
+#[derive(Default)]
+struct Alike(Vec<(u8, i64)>);
+
+impl Alike {
+    fn number(&mut self, what: (u8, i64)) -> u8 {
+        let known = self.0.iter().position(|known| *known == what);
+        let place = known.unwrap_or_else(|| {
+            self.0.push(what);
+            self.0.len() - 1
+        });
+        place as u8 + 1
+    }
 }
 
 /// While it is followed.
@@ -103,13 +119,13 @@ impl Walk<'_> {
         match action {
             Action::Move(a_move) => {
                 let cycles = timing::cycles(self.group, a_move, &self.at);
+                let mut alike = Alike::default();
                 for part in &a_move.parts {
-                    let from = if a_move.relative {
-                        self.at[part.axis]
-                    } else {
-                        0
-                    };
-                    self.go(part.axis, from + i64::from(part.target), part.set);
+                    let at = self.at[part.axis];
+                    let from = if a_move.relative { at } else { 0 };
+                    let to = from + i64::from(part.target);
+                    let set = alike.number((part.set, (to - at).abs()));
+                    self.go(part.axis, to, set);
                 }
                 self.course.cycles += u64::from(cycles) + SETTLING_CYCLES;
             }
@@ -130,16 +146,17 @@ impl Walk<'_> {
                 let cycles = path.points.iter().map(|point| u64::from(point.cycles));
                 self.course.cycles += cycles.sum::<u64>() * u64::from(path.periods);
                 self.course.cycles += SETTLING_CYCLES;
+                let mut alike = Alike::default();
                 for (member, of) in path.members.iter().enumerate() {
-                    let end = path
-                        .points
-                        .last()
-                        .map_or(0.0, |last| path.at(member, last).0);
+                    let last = path.points.last();
+                    let end = last.map_or(0.0, |last| path.at(member, last).0);
                     let to = self.at[of.axis] + end.round() as i64;
-                    self.go(of.axis, to, 0);
+                    let shape = if path.shared { 0 } else { member as u8 };
+                    let set = alike.number((shape, i64::from(of.amplitude).abs()));
+                    self.go(of.axis, to, set);
                     // It moved, wherever it ends.
                     let target = self.at[of.axis] as i32;
-                    self.moved[of.axis] = Some(Stop { target, set: 0 });
+                    self.moved[of.axis] = Some(Stop { target, set });
                 }
             }
             Action::Home { axes, limit } => {

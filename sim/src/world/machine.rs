@@ -167,6 +167,9 @@ impl Machine {
 /// Axes that the firmware leads at most.
 const AXES_MAX: usize = 16;
 
+/// No run is so long that a program is repeated so often.
+const NEVER: usize = 1000;
+
 /// Where each axis has to come to rest, and how long that takes.
 type Moves = (Vec<Vec<Option<Part>>>, Option<Time>);
 
@@ -179,7 +182,9 @@ fn course(program: &Program, group: &Group) -> Moves {
             set: stop.set,
         })
     };
-    let rests = course.rests.into_iter();
+    // One that does not end is never seen to have ended.
+    let times = if course.endless { NEVER } else { 1 };
+    let rests = std::iter::repeat_n(course.rests, times).flatten();
     let moves = rests.map(|rest| rest.into_iter().map(part).collect());
     let whole = Time::from_us(course.cycles * u64::from(group.cycle_us));
     (moves.collect(), (!course.endless).then_some(whole))

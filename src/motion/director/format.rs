@@ -184,7 +184,8 @@ impl<'a> Step<'a> {
             greatest(&mut steepest, 2.0 * (middle - from) / cycles);
             greatest(&mut steepest, 2.0 * (to - middle) / cycles);
             if let Some(begin) = begin {
-                for (from, ahead) in [(&before, from), (&knot, -to), (&knot, 0.0)] {
+                // A knot lies between the control points on both of its sides.
+                for (from, ahead) in [(&before, from), (&knot, -to)] {
                     let ahead = fixed::fixed(ahead * cycles * THIRD);
                     let at = fixed::round(from.position.wrapping_add(ahead));
                     limits.reaches(axis, begin.saturating_add(at))?;

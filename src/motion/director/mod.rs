@@ -9,11 +9,10 @@ pub mod format;
 use self::format::{FLYING, RELATIVE, Step, members};
 use super::group::{Group, Order, SetPoint};
 use super::mode::Mode;
-use super::path::Knot;
 use super::plan::{self, Leg};
 use super::program::{AxisMove, Fault, PlanError, within};
 use super::scale::Scale;
-use super::{GroupConfig, GroupEvent, GroupState, Refusal, fixed};
+use super::{AxisConfig, GroupConfig, GroupEvent, GroupState, Refusal, fixed};
 use heapless::Vec;
 
 /// Cycles from the look at the group to the first step of the plan; doubled when
@@ -59,9 +58,10 @@ struct Loop {
     left: u32,
 }
 
-/// Plans for a [`Group`].
+/// Plans for a [`Group`]. What is long stands last: the rest is reached by short
+/// instructions.
+#[repr(C)]
 pub struct Director<const N: usize> {
-    config: Option<&'static GroupConfig<N>>,
     phase: Phase,
     /// A program runs.
     running: bool,
@@ -69,6 +69,7 @@ pub struct Director<const N: usize> {
     path: bool,
     flying: bool,
     number: u16,
+    config: Option<&'static GroupConfig<N>>,
     /// Where the step that runs begins, and the next one.
     at: usize,
     next: usize,
@@ -81,12 +82,9 @@ pub struct Director<const N: usize> {
     later: u32,
     /// Cycles until the next look is needed; 0: something happens before.
     patience: u32,
+    event: Vec<GroupEvent, 1>,
     loops: Vec<Loop, { format::LOOPS }>,
     legs: [Leg; N],
-    /// Where the paths begin, and homes, increments of 6064h.
-    begins: [i32; N],
-    homes: [i32; N],
-    event: Vec<GroupEvent, 1>,
 }
 
 impl<const N: usize> Director<N> {
@@ -108,8 +106,6 @@ impl<const N: usize> Director<N> {
         patience: 0,
         loops: Vec::new(),
         legs: [const { Leg::ZERO }; N],
-        begins: [0; N],
-        homes: [0; N],
         event: Vec::new(),
     };
 
@@ -472,28 +468,27 @@ impl<const N: usize> Director<N> {
     /// drives; `false` if one has not taken its last set-point yet.
     #[inline(never)]
     fn predict(&mut self, group: &mut Group<N>, step: &Step<'_>) -> Result<bool, PlanError> {
-        let (lead, config) = (LEAD + self.later, self.config);
+        let lead = LEAD + self.later;
         self.start = group.count().wrapping_add(lead);
-        let places = self.begins.iter_mut().zip(&mut self.homes);
-        for (axis, (leg, (begin, home))) in self.legs.iter_mut().zip(places).enumerate() {
+        let all = self.legs.iter_mut().zip(limits(self.config));
+        for (axis, (leg, limits)) in all.enumerate() {
             let Some(view) = group.view(axis) else {
                 continue;
             };
-            (*begin, *home) = (view.reference, view.home);
-            let number = axis as u8;
-            if self.path {
+            leg.home = view.home;
+            let is_in = step.axes >> axis & 1 != 0;
+            if self.path && is_in && !view.mode.has_position() {
                 // Its drive moves it by itself, or it is no motion.
-                if step.axes >> axis & 1 != 0 && !view.mode.has_position() {
-                    let mode = u32::from(view.mode as u8);
-                    return Err(PlanError {
-                        axis: number,
-                        ..PlanError::whole(Fault::Mode, mode, Mode::WITH_POSITION)
-                    });
-                }
-            } else if leg.set.is_some() && view.mode == Mode::ProfilePosition {
-                let scale = scale(config, axis);
-                let up = scale.rpm_per_s(leg.acceleration);
-                group.set_ramps(axis, up, scale.rpm_per_s(leg.deceleration));
+                let mode = u32::from(view.mode as u8);
+                return Err(PlanError {
+                    axis: axis as u8,
+                    ..PlanError::whole(Fault::Mode, mode, Mode::WITH_POSITION)
+                });
+            }
+            if !self.path && leg.set.is_some() && view.mode == Mode::ProfilePosition {
+                let up = limits.scale.rpm_per_s(leg.acceleration);
+                let down = limits.scale.rpm_per_s(leg.deceleration);
+                group.set_ramps(axis, up, down);
                 let set_point = SetPoint {
                     target: leg.target,
                     immediately: true,
@@ -503,9 +498,8 @@ impl<const N: usize> Director<N> {
                     return Ok(false);
                 }
                 leg.set = None;
-            } else if leg.set.is_some() {
-                leg.from = group.predict(axis, lead - 1).unwrap_or_default();
             }
+            leg.from = group.predict(axis, lead - 1).unwrap_or_default();
         }
         Ok(true)
     }
@@ -515,50 +509,37 @@ impl<const N: usize> Director<N> {
     pub fn think(&mut self, program: &[u8]) {
         let step = Step::at(format::steps(program), self.at);
         self.phase = Phase::Planned;
-        let result = if self.path {
-            self.check_path(&step)
-        } else {
-            self.plan()
-        };
+        let result = self.plan(&step);
         self.judge(result);
     }
 
-    fn plan(&mut self) -> Result<(), PlanError> {
-        plan::plan(&mut self.legs).map_err(|axis| PlanError {
-            axis,
-            ..PlanError::whole(Fault::Time, u32::MAX, plan::CYCLES_MAX)
-        })?;
-        let places = self.legs.iter().zip(&self.homes);
-        let axes = self.config.map_or(&[][..], |config| &config.axes);
-        for (axis, ((leg, home), limits)) in (0..).zip(places.zip(axes)) {
-            if leg.set.is_some() && leg.turn != 0.0 {
-                let from = fixed::round(leg.from.position).wrapping_sub(*home);
-                limits.reaches(axis, from.saturating_add(leg.turn as i32))?;
-            }
+    fn plan(&mut self, step: &Step<'_>) -> Result<(), PlanError> {
+        if !self.path {
+            plan::plan(&mut self.legs).map_err(|axis| PlanError {
+                axis,
+                ..PlanError::whole(Fault::Time, u32::MAX, plan::CYCLES_MAX)
+            })?;
         }
-        Ok(())
-    }
-
-    fn check_path(&mut self, step: &Step<'_>) -> Result<(), PlanError> {
-        let places = self.begins.iter().zip(&self.homes).zip(&mut self.legs);
-        let axes = self.config.map_or(&[][..], |config| &config.axes);
         let mut member = 0;
-        for (axis, (((begin, home), leg), limits)) in places.zip(axes).enumerate() {
-            if step.axes >> axis & 1 == 0 {
-                continue;
+        let all = self.legs.iter_mut().zip(limits(self.config));
+        for (axis, (leg, limits)) in (0..).zip(all) {
+            let from = fixed::round(leg.from.position).wrapping_sub(leg.home);
+            if !self.path {
+                if leg.set.is_some() && leg.turn != 0.0 {
+                    limits.reaches(axis, from.saturating_add(leg.turn as i32))?;
+                }
+            } else if step.axes >> axis & 1 != 0 {
+                let told = step.begin(member);
+                if !step.has(RELATIVE) && from != told {
+                    return Err(PlanError {
+                        axis,
+                        ..PlanError::whole(Fault::Begin, from as u32, told as u32)
+                    });
+                }
+                let slope = step.check_path(axis, member, limits, Some(from))?;
+                (leg.up, leg.down) = (slope, slope);
+                member += 1;
             }
-            let number = axis as u8;
-            let begin = begin.wrapping_sub(*home);
-            let told = step.begin(member);
-            if !step.has(RELATIVE) && begin != told {
-                return Err(PlanError {
-                    axis: number,
-                    ..PlanError::whole(Fault::Begin, begin as u32, told as u32)
-                });
-            }
-            let slope = step.check_path(number, member, limits, Some(begin))?;
-            (leg.up, leg.down) = (slope, slope);
-            member += 1;
         }
         Ok(())
     }
@@ -589,13 +570,13 @@ impl<const N: usize> Director<N> {
             self.phase = Phase::Plan;
             return;
         }
-        let config = self.config;
-        for (axis, leg) in self.legs.iter().enumerate() {
+        let all = self.legs.iter().zip(limits(self.config));
+        for (axis, (leg, limits)) in all.enumerate() {
             if axes >> axis & 1 == 0 {
                 continue;
             }
-            let scale = scale(config, axis);
-            group.set_ramps(axis, scale.rpm_per_s(leg.up), scale.rpm_per_s(leg.down));
+            let up = limits.scale.rpm_per_s(leg.up);
+            group.set_ramps(axis, up, limits.scale.rpm_per_s(leg.down));
             if !self.path {
                 for knot in &leg.knots {
                     group.push(axis, knot);
@@ -621,10 +602,10 @@ impl<const N: usize> Director<N> {
                 if group.room(axis) == 0 {
                     return;
                 }
-                let knot = step.point(member, self.point);
-                let begin = self.begins.get(axis).copied().unwrap_or_default();
-                let position = fixed::whole(begin).wrapping_add(knot.position);
-                group.push(axis, &Knot { position, ..knot });
+                let mut knot = step.point(member, self.point);
+                let begin = self.legs.get(axis).map_or(0, |leg| leg.from.position);
+                knot.position = knot.position.wrapping_add(begin);
+                group.push(axis, &knot);
             }
             self.point += 1;
             if self.point == step.points() {
@@ -635,8 +616,7 @@ impl<const N: usize> Director<N> {
     }
 }
 
-/// The units of an axis.
-fn scale<const N: usize>(config: Option<&GroupConfig<N>>, axis: usize) -> Scale {
-    let limits = config.and_then(|config| config.axes.get(axis));
-    limits.map_or(Scale::ONE, |limits| limits.scale)
+/// The axes' limits and units.
+fn limits<const N: usize>(config: Option<&'static GroupConfig<N>>) -> &'static [AxisConfig] {
+    config.map_or(&[], |config| &config.axes)
 }

@@ -1,6 +1,7 @@
 //! `cargo xtask run`: the image on the emulated board, six drives, one table.
 
 mod ctrl_c;
+mod download;
 pub(crate) mod fault;
 mod output;
 mod progress;
@@ -33,20 +34,34 @@ const FACTORY: Time = Time::from_ms(4500);
 const MARGIN: Time = Time::from_ms(1000);
 
 pub(crate) fn command(options: &RunOptions) -> Result<ExitCode> {
-    let checked = Checked::read(options.machine.network.as_deref())?;
+    let file = options.machine.network.as_deref();
+    let (checked, program) = match &options.program {
+        Some(program) => {
+            let (checked, program) = Checked::with_program(file, program)?;
+            (checked, Some(program))
+        }
+        None => (Checked::read(file)?, None),
+    };
     known(options, checked.machine.network());
     eprintln!("Building the firmware.");
     let elf = checked.build()?;
     let size = ImageSize::read(&elf)?;
     let image = checked.image(&elf)?;
     let started = Instant::now();
-    let scenario = scenario(options, &checked.machine);
+    let mut scenario = scenario(options, &checked.machine);
+    if program.is_some() {
+        // Nobody presses the button before the program is there.
+        scenario = scenario.unattended();
+    }
     let mut progress = Progress::new(options, &checked.machine, scenario.end);
     let mut world =
         World::new(&image, scenario).context("the emulated board cannot boot this image")?;
     if let Some(port) = options.bridge {
         world = world.with_bridge(bridge(port, checked.machine.network())?);
         progress.stop_on(ctrl_c::handle()?);
+    }
+    if let Some(program) = &program {
+        world = download::before_the_release(world, program)?;
     }
     let record = world.run(&mut progress);
     progress.finish();
