@@ -79,12 +79,30 @@ in_words!(State {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct StatusWord(pub u16);
 
+/// The state for each value of the bits that tell it: looked at several times for
+/// each axis in every cycle.
+static STATES: [State; MASK_STATE as usize + 1] = {
+    let mut all = [State::Fault; MASK_STATE as usize + 1];
+    let (mut left, mut bits): (&mut [State], u16) = (&mut all, 0);
+    while let Some((state, more)) = left.split_first_mut() {
+        *state = StatusWord(bits).decode();
+        (left, bits) = (more, bits + 1);
+    }
+    all
+};
+
 impl StatusWord {
     /// The state of the drive's state machine.
     ///
     /// Bit 5 is not looked at in the states that leave it open: drives report
     /// it both ways in [`State::Fault`].
-    pub const fn state(self) -> State {
+    pub fn state(self) -> State {
+        let bits = self.0 & MASK_STATE;
+        let known = STATES.get(usize::from(bits)).copied();
+        known.unwrap_or(State::Other(bits as u8))
+    }
+
+    const fn decode(self) -> State {
         match self.0 & MASK_WITHOUT_QUICK_STOP {
             0x00 => return State::NotReadyToSwitchOn,
             0x40 => return State::SwitchOnDisabled,

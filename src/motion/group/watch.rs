@@ -54,16 +54,16 @@ impl<const N: usize> Group<N> {
             return None;
         }
         let status = StatusWord(feedback.statusword);
+        let drive = status.state();
         if state == GroupState::Enabling {
             // The first stage of enabling resets the faults of the past.
             let reset = self.stage == Goal::Disabled;
-            return (status.state().is_fault() && !reset)
-                .then_some(FaultCause::DriveFault { status });
+            return (drive.is_fault() && !reset).then_some(FaultCause::DriveFault { status });
         }
-        if status.state().is_fault() {
+        if drive.is_fault() {
             return Some(FaultCause::DriveFault { status });
         }
-        if !status.state().is_enabled() {
+        if !drive.is_enabled() {
             return Some(FaultCause::LeftEnabled { status });
         }
         let allowed = axis.config.following_error_max;
