@@ -226,8 +226,8 @@ impl Line {
         let (from, until) = *derived::SDO_US.get(bus)?;
         let sdo = free || (from <= us && us < until && self.rpdos_are_sent());
         let until = match EARLY {
-            // After the RPDOs.
-            true => derived::TPDO_DEADLINE_US,
+            // Whenever the RPDOs are sent: TPDOs may have gone ahead of these.
+            true => u16::MAX,
             false => *derived::AFTER_SYNC_US.get(bus)?,
         };
         let others = free || us < until;
