@@ -108,6 +108,8 @@ pub struct Axis {
     goal: Goal,
     since: Instant,
     timeout: Duration,
+    /// The statusword that was judged last for this goal.
+    judged: Option<StatusWord>,
     state: Option<State>,
     word: ControlWord,
     reset: Reset,
@@ -121,6 +123,7 @@ impl Axis {
             goal: Goal::Disabled,
             since: Instant::ZERO,
             timeout,
+            judged: None,
             state: None,
             word: ControlWord::new(Command::DisableVoltage),
             reset: Reset::Idle,
@@ -131,6 +134,7 @@ impl Axis {
     pub const fn set_goal(&mut self, goal: Goal, now: Instant) {
         self.goal = goal;
         self.since = now;
+        self.judged = None;
         self.state = None;
     }
 
@@ -156,7 +160,13 @@ impl Axis {
         let Some(status) = fresh else {
             return self.word;
         };
+        let judged = self.judged.is_some_and(|last| last.is_alike(status));
+        if judged && matches!(self.reset, Reset::Idle) {
+            // The way of almost every cycle.
+            return self.word;
+        }
         let state = status.state();
+        self.judged = Some(status);
         self.state = Some(state);
         match self.goal.command_from(state) {
             None => {}

@@ -79,30 +79,12 @@ in_words!(State {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct StatusWord(pub u16);
 
-/// The state for each value of the bits that tell it: looked at several times for
-/// each axis in every cycle.
-static STATES: [State; MASK_STATE as usize + 1] = {
-    let mut all = [State::Fault; MASK_STATE as usize + 1];
-    let (mut left, mut bits): (&mut [State], u16) = (&mut all, 0);
-    while let Some((state, more)) = left.split_first_mut() {
-        *state = StatusWord(bits).decode();
-        (left, bits) = (more, bits + 1);
-    }
-    all
-};
-
 impl StatusWord {
     /// The state of the drive's state machine.
     ///
     /// Bit 5 is not looked at in the states that leave it open: drives report
     /// it both ways in [`State::Fault`].
-    pub fn state(self) -> State {
-        let bits = self.0 & MASK_STATE;
-        let known = STATES.get(usize::from(bits)).copied();
-        known.unwrap_or(State::Other(bits as u8))
-    }
-
-    const fn decode(self) -> State {
+    pub const fn state(self) -> State {
         match self.0 & MASK_WITHOUT_QUICK_STOP {
             0x00 => return State::NotReadyToSwitchOn,
             0x40 => return State::SwitchOnDisabled,
@@ -117,6 +99,17 @@ impl StatusWord {
             0x07 => State::QuickStopActive,
             other => State::Other(other as u8),
         }
+    }
+
+    /// Whether `other` stands for the same state for certain: all bits that may tell
+    /// it are alike.
+    pub(crate) const fn is_alike(self, other: StatusWord) -> bool {
+        (self.0 ^ other.0) & MASK_STATE == 0
+    }
+
+    /// Whether the state is [`State::OperationEnabled`].
+    pub const fn is_enabled(self) -> bool {
+        self.0 & MASK_STATE == State::OperationEnabled.bits()
     }
 
     const fn bit(self, n: u16) -> bool {

@@ -353,8 +353,8 @@ mod app {
         if derived::WINDOW_US != 0 && cx.local.deadline.take_second() {
             lines::send_now();
         }
-        let deadline = cx.local.deadline.take();
-        if deadline {
+        let due = cx.local.deadline.take();
+        if due {
             // Once per period, whatever else pends the task.
             roll::check_in(Task::PdoProducer);
         }
@@ -362,27 +362,29 @@ mod app {
         let producing = PRODUCING.load(Ordering::Relaxed);
         let Some(cycle) = cx.shared.od.lock(|od| {
             od.follow(syncs);
-            od.take_cycle(producing, deadline)
+            od.take_cycle(producing, due)
         }) else {
             return;
         };
         let control = cx.shared.control.lock(Control::take);
         let axes = cx.local.axes;
         axes.read(&cycle, &mut cx.shared.od);
-        axes.step(&control);
-        let enabled = axes.enabled(&control);
-        (&mut cx.shared.control, &mut cx.shared.commands).lock(|control, commands| {
-            control.axes_enabled = enabled;
-            *commands = *axes.commands();
+        let deadline = cx.local.deadline;
+        let shared = &mut cx.shared;
+        // Their ceiling is the priority of this task: nobody waits for them.
+        (&mut shared.control, &mut shared.commands).lock(|shared_control, commands| {
+            axes.step(&control, commands);
+            shared_control.axes_enabled = axes.enabled(&control);
+            if deadline.elapsed_us() > control.latest_us {
+                // What comes after the window of the SYNC is not sent any more.
+                counters::RPDO_REPLACED.add(1);
+            } else if control.leads() && !control.bus_off {
+                if axes.write(&cycle, commands, &mut shared.lines) {
+                    lines::send_now();
+                }
+                measured::give(Figure::Cycle, shared.phase.elapsed_us());
+            }
         });
-        if cx.local.deadline.elapsed_us() > control.latest_us {
-            // What comes after the window of the SYNC is not sent any more.
-            counters::RPDO_REPLACED.add(1);
-        } else if control.leads() && !control.bus_off {
-            axes.write(&cycle, &mut cx.shared.lines);
-            lines::send_now();
-            measured::give(Figure::Cycle, cx.shared.phase.elapsed_us());
-        }
         while let Some(event) = axes.take_event() {
             if cx.local.events_to.enqueue(event).is_err() {
                 counters::LOG_FULL.add(1);

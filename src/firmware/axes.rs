@@ -29,7 +29,6 @@ pub(crate) struct Axes {
     network: &'static Network,
     group: &'static mut Group<AXES>,
     feedback: [AxisFeedback; AXES],
-    commands: [AxisCommand; AXES],
     ramps: Ramps<AXES>,
     speed: [Speedometer; AXES],
 }
@@ -40,7 +39,6 @@ impl Axes {
             network,
             group,
             feedback: [AxisFeedback::default(); AXES],
-            commands: [AxisCommand::default(); AXES],
             ramps: Ramps::new(),
             speed: SPEEDOMETERS,
         }
@@ -64,7 +62,7 @@ impl Axes {
 
     /// Steps the group. A press of the button releases the motion, and stops it
     /// when there is one.
-    pub(crate) fn step(&mut self, control: &Control) {
+    pub(crate) fn step(&mut self, control: &Control, commands: &mut [AxisCommand; AXES]) {
         let moving = self.group.state() == GroupState::Moving;
         let request = Request {
             network_ready: control.network_ready
@@ -76,12 +74,7 @@ impl Axes {
             fault: control.fault,
             absent: !control.operational,
         };
-        self.group.step(request, &self.feedback, &mut self.commands);
-    }
-
-    /// What the axes are told.
-    pub(crate) const fn commands(&self) -> &[AxisCommand; AXES] {
-        &self.commands
+        self.group.step(request, &self.feedback, commands);
     }
 
     /// Whether an axis is enabled or led there. What was last heard of a node that
@@ -100,16 +93,23 @@ impl Axes {
         self.group.take_event()
     }
 
-    /// Writes the RPDOs of the next cycle.
-    pub(crate) fn write(&mut self, cycle: &Cycle, lines: &mut impl Mutex<T = Lines>) {
+    /// Writes the RPDOs of the next cycle. Whether any of them may go before the
+    /// next SYNC.
+    pub(crate) fn write(
+        &mut self,
+        cycle: &Cycle,
+        commands: &[AxisCommand; AXES],
+        lines: &mut impl Mutex<T = Lines>,
+    ) -> bool {
+        let mut any = false;
         lines.lock(|lines| {
             for line in lines.iter_mut() {
                 line.begin(cycle.sync);
             }
         });
-        let due = self.ramps.due(&self.commands);
+        let due = self.ramps.due(commands);
         let nodes = self.network.nodes.iter().zip(&PDOS);
-        for (axis, ((node, pdos), command)) in nodes.zip(&self.commands).enumerate() {
+        for (axis, ((node, pdos), command)) in nodes.zip(commands).enumerate() {
             let image = pdos.image(command);
             for number in 0..TPDOS_PER_AXIS as u8 {
                 let ramps = pdos.has_only_ramps(number);
@@ -120,17 +120,20 @@ impl Axes {
                 let Some(frame) = pdos.rpdo(number, node.id, &image) else {
                     continue;
                 };
+                let early = ramps || RPDOS_AFTER_SYNC;
+                any |= on_change || !early;
                 lines.lock(|lines| {
                     let bus = AXIS_BUSES.get(axis).map(|bus| usize::from(*bus));
                     if let Some(line) = bus.and_then(|bus| lines.get_mut(bus)) {
                         if on_change {
                             line.on_change(frame);
                         } else {
-                            line.cyclic(frame, ramps || RPDOS_AFTER_SYNC);
+                            line.cyclic(frame, early);
                         }
                     }
                 });
             }
         }
+        any
     }
 }

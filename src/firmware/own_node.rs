@@ -23,7 +23,7 @@ use canmaster::{
     emcy::EmcyCode,
     frame::MAX_DATA,
     id::Address,
-    master::{IMAGE_BYTES, MasterOd, Notice, WrongLength},
+    master::{MasterOd, Notice, WrongLength},
     motion::{AxisCommand, FaultCause, GroupEvent, GroupState},
     network::Network,
     nmt::{Command, ErrorControl, NodeControl, State, Target},
@@ -126,12 +126,12 @@ where
             let command = self.commands.lock(|commands| commands.get(axis).copied())?;
             Some(PDOS.get(axis)?.image(&command))
         });
-        pdo(&image.unwrap_or([0; IMAGE_BYTES]), number)
+        image.map_or([0; MAX_DATA], |image| pdo(&image, number))
     }
 }
 
 /// The PDO `number`, counted from 1.
-fn pdo(image: &[u8; IMAGE_BYTES], number: u8) -> [u8; 8] {
+fn pdo(image: &[u8], number: u8) -> [u8; MAX_DATA] {
     let place = usize::from(number.wrapping_sub(1)) * MAX_DATA;
     let bytes = image.get(place..).and_then(|rest| rest.first_chunk());
     bytes.copied().unwrap_or_default()

@@ -56,7 +56,9 @@ impl Receiver {
             self.error_state(bus, sender, lines, states);
         }
         // First of all, so that the bus is not idle for longer than it must.
-        lines::refill(bus, lines, sender, self.phase);
+        if lines::take_wanted(bus) || flags.sent() {
+            lines::refill(bus, lines, sender, self.phase);
+        }
         if flags.sent_at() {
             while let Some(at) = self.rx.take_sent_at(controller) {
                 measured::sync_began(bus, at);

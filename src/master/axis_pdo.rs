@@ -38,8 +38,10 @@ struct Place(u8);
 /// An object that is not mapped lies behind all that is.
 const NOWHERE: Place = Place((MAX_DATA * PDOS) as u8);
 
-/// The objects of one direction as they lie in the PDOs.
+/// The objects that an axis sends, as they lie in the PDOs.
 type Image = [u8; IMAGE_BYTES];
+/// Those that it receives.
+pub type RpdoImage = [u8; PDOS * MAX_DATA];
 
 impl Place {
     /// The first place of `wanted` in these PDOs; `None`: not mapped.
@@ -84,7 +86,7 @@ impl Place {
 
     /// Writes the first bytes of `value`.
     #[inline]
-    fn write<const BYTES: usize>(self, image: &mut Image, value: [u8; BYTES]) {
+    fn write<const BYTES: usize>(self, image: &mut RpdoImage, value: [u8; BYTES]) {
         let place = image.get_mut(usize::from(self.0)..);
         if let Some(bytes) = place.and_then(<[u8]>::first_chunk_mut) {
             *bytes = value;
@@ -226,8 +228,9 @@ impl AxisPdos {
     }
 
     /// The RPDOs of the axis.
-    pub fn image(&self, command: &AxisCommand) -> Image {
-        let mut image = [0; IMAGE_BYTES];
+    #[inline]
+    pub fn image(&self, command: &AxisCommand) -> RpdoImage {
+        let mut image = [0; PDOS * MAX_DATA];
         let [controlword, velocity, acceleration, deceleration] = self.commands;
         controlword.write(&mut image, command.controlword.to_le_bytes());
         velocity.write(&mut image, command.velocity.to_le_bytes());
@@ -237,7 +240,7 @@ impl AxisPdos {
     }
 
     /// The RPDO `number`, counted from 0, for `node`. `None`: it has none.
-    pub fn rpdo(&self, number: u8, node: NodeId, image: &Image) -> Option<Frame> {
+    pub fn rpdo(&self, number: u8, node: NodeId, image: &RpdoImage) -> Option<Frame> {
         let function = match number {
             0 => FunctionCode::Rpdo1,
             _ => FunctionCode::Rpdo2,

@@ -17,7 +17,7 @@ mod supervisor;
 mod tx_queue;
 
 pub use axis_map::AxisMap;
-pub use axis_pdo::AxisPdos;
+pub use axis_pdo::{AxisPdos, RpdoImage};
 pub use burst::Burst;
 pub use clock::ExtendedClock;
 pub use debounce::Debounce;

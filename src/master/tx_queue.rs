@@ -8,13 +8,13 @@ use heapless::Vec;
 
 /// The buffers that frames other than SYNC may occupy. A third stays free, so
 /// that a SYNC never waits for more than the frame on the wire.
-const SHARED_BUFFERS: usize = 2;
+const SHARED_BUFFERS: u32 = 2;
+/// All of them.
+const BUFFERS: usize = 3;
 /// The identifiers of SDO begin here.
 const SDO: u16 = FunctionCode::SdoResponse.base();
 /// The bits of an identifier that tell its function.
 const FUNCTION: u16 = !(NodeId::MAX.get() as u16);
-/// The largest identifier.
-const ID_MAX: u16 = 0x7FF;
 
 /// The queue is full: the frame was not taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,16 +35,23 @@ pub enum Put {
 
 /// The identifiers of the frames in the controller's three buffers; numbers above
 /// 7FFh stand for buffers without a frame.
-pub type Pending = [u16; 3];
+pub type Pending = [u16; BUFFERS];
 
-/// How many more frames other than SYNC the controller may be given.
+/// How many more frames the controller may be given, bit n of `waiting` being set
+/// if its buffer n holds one. A SYNC counts: it leaves soon, and the controller
+/// tells when.
 #[inline(always)]
-pub fn room(pending: &Pending) -> usize {
-    const fn other(id: u16) -> usize {
-        (id <= ID_MAX && id != CobId::SYNC.get()) as usize
-    }
-    let [a, b, c] = *pending;
-    SHARED_BUFFERS.saturating_sub(other(a) + other(b) + other(c))
+pub fn room(waiting: u32) -> u8 {
+    const ROOM: [u8; 1 << BUFFERS] = {
+        let (mut all, mut waiting) = ([0; 1 << BUFFERS], 0);
+        let mut left: &mut [u8] = &mut all;
+        while let Some((room, more)) = left.split_first_mut() {
+            *room = SHARED_BUFFERS.saturating_sub(u32::count_ones(waiting)) as u8;
+            (left, waiting) = (more, waiting + 1);
+        }
+        all
+    };
+    ROOM.get(waiting as usize).copied().unwrap_or(0)
 }
 
 /// Whether a frame with the identifier `id` is `pending`.
@@ -138,9 +145,10 @@ impl<const N: usize> TxQueue<N> {
 
     /// Takes the frame to be given to the controller next.
     ///
-    /// `None` if two frames other than SYNC are there already, or if nothing
-    /// waits but identifiers that are: the controller does not keep the order of
-    /// equal identifiers, so it gets the next only when the last has left.
+    /// `None` if nothing waits but identifiers that are `pending` there: the
+    /// controller does not keep the order of equal identifiers, so it gets the next
+    /// only when the last has left. Whether there is [`room`] is for the caller to
+    /// see.
     ///
     /// While a heartbeat is in a buffer, SDO waits here: on a bus full of it no
     /// heartbeat, which has the lowest priority of all, would get through. Once
@@ -152,9 +160,6 @@ impl<const N: usize> TxQueue<N> {
 
     /// The same, of those whose identifier `may` go now.
     pub fn next_of(&mut self, pending: &Pending, may: impl Fn(CobId) -> bool) -> Option<Frame> {
-        if room(pending) == 0 {
-            return None;
-        }
         let [a, b, c] = *pending;
         let beating = is_error_control(a) || is_error_control(b) || is_error_control(c);
         let position = self.frames.iter().rposition(|queued| {
@@ -271,10 +276,8 @@ mod tests {
 
     #[test]
     fn one_buffer_stays_free_for_sync() {
-        let mut queue = TxQueue::<8>::new();
-        queue.put(frame(0x201, 1)).unwrap();
-        assert_eq!(next(&mut queue, &[FREE, 0x301, 0x302]), None);
-        assert_eq!(next(&mut queue, &[0x080, 0x301, FREE]), Some((0x201, 1)));
+        let rooms: StdVec<_> = (0..9).map(room).collect();
+        assert_eq!(rooms, [2, 1, 1, 0, 1, 0, 0, 0, 0]);
     }
 
     #[test]

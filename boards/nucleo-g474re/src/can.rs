@@ -106,12 +106,18 @@ pub struct Tx {
     _only: (),
 }
 
-/// The identifiers of the frames that wait to be sent; [`FREE`] for a buffer
-/// without one. For any task: a frame that is requested meanwhile may be missing.
+/// Which buffers hold a frame that waits to be sent: bit n for buffer n. For any
+/// task: a frame that is requested meanwhile may be missing.
 #[inline(always)]
-pub fn pending(of: Controller) -> [u16; BUFFERS] {
+pub fn waiting(of: Controller) -> u32 {
     // A request shows in TXBRP only when the controller's scan is done.
-    let waiting = registers(of).txbrp().read().bits() | registers(of).txbar().read().bits();
+    registers(of).txbrp().read().bits() | registers(of).txbar().read().bits()
+}
+
+/// The identifiers of the frames that wait to be sent, of those buffers that
+/// [`waiting`] names; [`FREE`] for the others.
+#[inline(always)]
+pub fn pending(of: Controller, waiting: u32) -> [u16; BUFFERS] {
     let mut pending = [FREE; BUFFERS];
     let (Some(held), true) = (IDENTIFIERS.get(of.index()), waiting != 0) else {
         // The way of almost every SYNC.
@@ -131,13 +137,14 @@ pub fn pending(of: Controller) -> [u16; BUFFERS] {
 }
 
 impl Tx {
-    /// Requests the transmission of `element`.
+    /// Requests the transmission of `element`. The number of the buffer that it is
+    /// in.
     ///
     /// # Errors
     ///
     /// [`TransmitError::Full`]: nothing was changed.
     #[inline(always)]
-    pub fn transmit(&mut self, by: Controller, element: &Element) -> Result<(), TransmitError> {
+    pub fn transmit(&mut self, by: Controller, element: &Element) -> Result<usize, TransmitError> {
         let status = registers(by).txfqs().read();
         let index = status.tfqpi().bits() as usize;
         let held = IDENTIFIERS.get(by.index());
@@ -156,7 +163,7 @@ impl Tx {
         registers(by)
             .txbar()
             .write(|w| unsafe { w.bits(1 << index) });
-        Ok(())
+        Ok(index)
     }
 
     /// Takes back every frame that has not started, so that none goes out late:
@@ -204,6 +211,7 @@ const FLAG_FIFO_0: u32 = 1 << 0;
 const FLAG_FIFO_0_LOST: u32 = 1 << 2;
 const FLAG_FIFO_1: u32 = 1 << 3;
 const FLAG_FIFO_1_LOST: u32 = 1 << 5;
+const FLAG_SENT: u32 = 1 << 7;
 const FLAG_TX_EVENT: u32 = 1 << 10;
 const FLAG_ERROR_PASSIVE: u32 = 1 << 17;
 const FLAG_ERROR_WARNING: u32 = 1 << 18;
@@ -222,6 +230,12 @@ impl Flags {
             Fifo::Fifo1 => FLAG_FIFO_1,
         };
         self.0 & flag != 0
+    }
+
+    /// Frames were sent: there is room for others.
+    #[inline(always)]
+    pub fn sent(self) -> bool {
+        self.0 & FLAG_SENT != 0
     }
 
     /// A frame was sent of which the controller tells when.

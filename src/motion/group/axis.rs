@@ -12,6 +12,9 @@ use crate::time::Instant;
 /// Percent of the whole.
 const HUNDRED: f32 = 100.0;
 
+/// From the SYNC just passed to what the next command leads to.
+const POINTS: usize = 4;
+
 pub(super) struct Axis {
     /// Its place in the group.
     pub(super) n: u8,
@@ -21,6 +24,10 @@ pub(super) struct Axis {
     pub(super) scale: Scale,
     pub(super) machine: cia402::Axis,
     pub(super) reference: Reference,
+    /// What it is at four moments, that of `t` at place `t` modulo 4.
+    points: [Setpoint; POINTS],
+    /// The last of these moments; far in the past: none is known.
+    known: i32,
     /// Position that the program's targets count from.
     pub(super) home: i32,
     /// Last fresh statusword since the group began to enable.
@@ -61,6 +68,8 @@ impl Axis {
             scale,
             machine: cia402::Axis::new(group.enable_timeout),
             reference: Reference::Hold(0),
+            points: [Setpoint::at_rest(0); POINTS],
+            known: i32::MIN,
             home: 0,
             status: None,
             reported: None,
@@ -107,7 +116,10 @@ impl Axis {
         }
         self.missing = 0;
         let status = StatusWord(feedback.statusword);
-        self.status = Some(status);
+        let last = self.status.replace(status);
+        if last.is_some_and(|last| last.is_alike(status)) {
+            return None;
+        }
         let state = status.state();
         let changed = self.reported != Some(state);
         self.reported = Some(state);
@@ -119,9 +131,32 @@ impl Axis {
         self.status.map(StatusWord::state)
     }
 
+    /// Works out the reference around `t`: all that follows looks there. One moment
+    /// is new in each cycle.
+    pub(super) fn look(&mut self, t: i32) {
+        let last = t + 2;
+        let first = match last.wrapping_sub(self.known) {
+            0 => return,
+            1 => last,
+            _ => t - 1,
+        };
+        for t in first..=last {
+            if let Some(point) = self.points.get_mut(t as usize % POINTS) {
+                *point = self.reference.at(t);
+            }
+        }
+        self.known = last;
+    }
+
+    /// The reference at a moment that was looked at.
+    fn at(&self, t: i32) -> &Setpoint {
+        let [first, ..] = &self.points;
+        self.points.get(t as usize % POINTS).unwrap_or(first)
+    }
+
     /// Reference minus actual position at the SYNC just passed.
     pub(super) fn error(&self, t: i32) -> i32 {
-        self.reference.at(t - 1).minus(self.feedback.position) as i32
+        self.at(t - 1).minus(self.feedback.position) as i32
     }
 
     /// Sets what to follow from the next SYNC on, and the drive's ramps for it.
@@ -130,6 +165,7 @@ impl Axis {
         self.acceleration = self.ramp(self.scale.rpm_per_s(up), group);
         self.deceleration = self.ramp(self.scale.rpm_per_s(down), group);
         self.reference = reference;
+        self.known = i32::MIN;
         self.settled = 0;
         self.arrived = false;
     }
@@ -225,10 +261,11 @@ impl Axis {
 
     /// Along the reference.
     pub(super) fn command_follow(&mut self, now: Instant, t: i32) -> AxisCommand {
+        self.look(t);
         let window = Window {
-            now: self.reference.at(t - 1),
-            ahead: self.reference.at(t + 1),
-            beyond: self.reference.at(t + 2).velocity,
+            now: *self.at(t - 1),
+            ahead: *self.at(t + 1),
+            beyond: self.at(t + 2).velocity,
         };
         let position = self.feedback.fresh.then_some(self.feedback.position);
         self.velocity = self

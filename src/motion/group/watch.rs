@@ -54,17 +54,20 @@ impl<const N: usize> Group<N> {
             return None;
         }
         let status = StatusWord(feedback.statusword);
-        let drive = status.state();
+        if !status.is_enabled() {
+            let fault = status.state().is_fault();
+            if state == GroupState::Enabling {
+                // The first stage of enabling resets the faults of the past.
+                let reset = self.stage == Goal::Disabled;
+                return (fault && !reset).then_some(FaultCause::DriveFault { status });
+            }
+            return Some(match fault {
+                true => FaultCause::DriveFault { status },
+                false => FaultCause::LeftEnabled { status },
+            });
+        }
         if state == GroupState::Enabling {
-            // The first stage of enabling resets the faults of the past.
-            let reset = self.stage == Goal::Disabled;
-            return (drive.is_fault() && !reset).then_some(FaultCause::DriveFault { status });
-        }
-        if drive.is_fault() {
-            return Some(FaultCause::DriveFault { status });
-        }
-        if !drive.is_enabled() {
-            return Some(FaultCause::LeftEnabled { status });
+            return None;
         }
         let allowed = axis.config.following_error_max;
         let error = axis.error(self.t);

@@ -1,6 +1,7 @@
 //! Frames as the message RAM holds them (RM0440, 44.3.4 and 44.3.5).
 
 use crate::message_ram::USED_WORDS;
+use core::arch::asm;
 use embedded_can::{Frame, StandardId};
 
 const REMOTE: u32 = 1 << 29;
@@ -37,6 +38,26 @@ impl Element {
     pub const fn with_event(self) -> Element {
         let [id, control, low, high] = self.0;
         Element([id, control | EVENT, low, high])
+    }
+
+    /// The same, worked out here: the compiler would do it as late as it can, which
+    /// is while the SYNC is held off.
+    #[inline(always)]
+    pub fn made(self) -> Element {
+        let [mut id, mut control, mut low, mut high] = self.0;
+        // SAFETY: no instruction; the compiler takes it for one that needs the four
+        // words.
+        unsafe {
+            asm!(
+                "/* {0} {1} {2} {3} */",
+                inout(reg) id,
+                inout(reg) control,
+                inout(reg) low,
+                inout(reg) high,
+                options(nomem, nostack, preserves_flags)
+            );
+        }
+        Element([id, control, low, high])
     }
 
     /// From now on `data` is the only byte, or there is none.
