@@ -7,7 +7,7 @@ use crate::{
 };
 use canmaster::{
     cia402::StatusWord,
-    master::{Cycle, MasterOd, Ramps, TPDOS_PER_AXIS, TpdoSlot},
+    master::{Cycle, MasterOd, Ramps, RpdoImage, TPDOS_PER_AXIS, TpdoSlot},
     motion::{AxisCommand, AxisFeedback, Group, GroupEvent, GroupState, Request, Speedometer},
     network::Network,
 };
@@ -101,7 +101,7 @@ impl Axes {
         commands: &[AxisCommand; AXES],
         lines: &mut impl Mutex<T = Lines>,
     ) -> bool {
-        let mut any = false;
+        let (mut any, mut image) = (false, RpdoImage::default());
         lines.lock(|lines| {
             for line in lines.iter_mut() {
                 line.begin(cycle.sync);
@@ -110,7 +110,7 @@ impl Axes {
         let due = self.ramps.due(commands);
         let nodes = self.network.nodes.iter().zip(&PDOS);
         for (axis, ((node, pdos), command)) in nodes.zip(commands).enumerate() {
-            let image = pdos.image(command);
+            pdos.write(command, &mut image);
             for number in 0..TPDOS_PER_AXIS as u8 {
                 let ramps = pdos.has_only_ramps(number);
                 let on_change = ramps && RAMPS_ON_CHANGE.get(axis).is_some_and(|on| *on);

@@ -203,9 +203,6 @@ impl Line {
         producing: bool,
         phase: Phase,
     ) -> Option<Frame> {
-        if !producing {
-            return self.planned.next(pending);
-        }
         let syncs = SYNCS.load(Relaxed);
         if syncs.wrapping_sub(self.cycle).cast_signed() > 0 {
             self.cycle = syncs;
@@ -214,11 +211,12 @@ impl Line {
                 _ => u8::MAX,
             };
         }
-        if self.left == 0 {
+        let left = if producing { self.left } else { u8::MAX };
+        if left == 0 {
             return None;
         }
         let us = phase.elapsed_us() as u16;
-        let free = self.left > 1;
+        let free = left > 1;
         let (from, until) = *derived::SDO_US.get(bus)?;
         let sdo = free || (from <= us && us < until && self.rpdos_are_sent());
         let until = match EARLY {

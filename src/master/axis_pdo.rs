@@ -227,15 +227,21 @@ impl AxisPdos {
         controlword.pdo() != number && velocity.pdo() != number
     }
 
-    /// The RPDOs of the axis.
-    #[inline]
-    pub fn image(&self, command: &AxisCommand) -> RpdoImage {
-        let mut image = [0; PDOS * MAX_DATA];
+    /// The RPDOs of the axis, into `image`.
+    #[inline(never)]
+    pub fn write(&self, command: &AxisCommand, image: &mut RpdoImage) {
+        *image = [0; PDOS * MAX_DATA];
         let [controlword, velocity, acceleration, deceleration] = self.commands;
-        controlword.write(&mut image, command.controlword.to_le_bytes());
-        velocity.write(&mut image, command.velocity.to_le_bytes());
-        acceleration.write(&mut image, command.acceleration.to_le_bytes());
-        deceleration.write(&mut image, command.deceleration.to_le_bytes());
+        controlword.write(image, command.controlword.to_le_bytes());
+        velocity.write(image, command.velocity.to_le_bytes());
+        acceleration.write(image, command.acceleration.to_le_bytes());
+        deceleration.write(image, command.deceleration.to_le_bytes());
+    }
+
+    /// The same, by value.
+    pub fn image(&self, command: &AxisCommand) -> RpdoImage {
+        let mut image = RpdoImage::default();
+        self.write(command, &mut image);
         image
     }
 
