@@ -1,12 +1,16 @@
 //! The figures of a scenario, and whether they reach its limits.
 
-use canmaster_sim::judge::bus::judge_running;
+use canmaster_sim::judge::bus::{judge_running, syncs};
+use canmaster_sim::judge::skew::skew_us;
 use canmaster_sim::judge::{BusFigures, Outcome, RealTime, realtime};
 use canmaster_sim::time::Time;
 use canmaster_sim::world::{BusRecord, Record};
 use serde::Serialize;
 
 use super::case::{Case, Limits};
+
+/// With interrupts off, and with a transmit request holding SYNC back.
+const HELD_CYCLES: f64 = 40.0;
 
 /// The names are the JSON object's.
 #[derive(Clone, Debug, Serialize)]
@@ -27,6 +31,9 @@ pub(crate) struct Figures {
     /// To the first transmit request, where there are several buses.
     sync_isr_first_cycles: u64,
     irq_off_max_cycles: u64,
+    /// How long a transmit request holds SYNC back: put index read, buffer filled,
+    /// requested.
+    sync_held_max_cycles: u64,
     burst_gap_max_bits: f64,
     /// On the bus that had the fewest.
     sdo_exchanges_per_s: f64,
@@ -67,6 +74,18 @@ fn of_bus(bus: &BusRecord, measured: &Measured, index: usize) -> (BusFigures, Re
     )
 }
 
+/// How far the SYNCs of one cycle are apart in the time that is looked at: while the
+/// nodes boot, their heartbeats may be in the way of one bus's.
+fn skew(measured: &Measured) -> f64 {
+    let seen = measured.from..measured.to;
+    let of_bus = |bus: &BusRecord| -> Vec<Time> {
+        let all = syncs(&bus.wire).into_iter();
+        all.filter(|at| seen.contains(at)).collect()
+    };
+    let buses: Vec<_> = measured.record.buses.iter().map(of_bus).collect();
+    skew_us(&buses, measured.record.machine.assignment().cycle)
+}
+
 impl Figures {
     pub(super) fn new(case: &Case, measured: &Measured) -> Figures {
         let record = &measured.record;
@@ -97,12 +116,13 @@ impl Figures {
             jitter_pp_us: worst(|bus| bus.jitter_pp_us),
             jitter_histogram: histogram,
             late_unexplained: buses.iter().map(|(_, bus)| bus.unexplained).sum(),
-            skew_us: record.skew_us,
+            skew_us: skew(measured),
             load_max: all.load_max,
             cpu_load: record.board.cpu_load(),
             sync_isr_worst_cycles: record.board.sync.worst_last_cycles,
             sync_isr_first_cycles: record.board.sync.worst_first_cycles,
             irq_off_max_cycles: record.board.irq_off_max_cycles,
+            sync_held_max_cycles: record.board.sync_masked_max_cycles,
             burst_gap_max_bits: worst(|bus| bus.burst_gap_bits),
             sdo_exchanges_per_s: answers.unwrap_or(0) as f64 / span,
             wire_bound_us: measured.wire_bound_us,
@@ -130,6 +150,8 @@ impl Figures {
         let cycles = &mut self.sync_isr_first_cycles;
         *cycles = other.sync_isr_first_cycles.max(*cycles);
         self.irq_off_max_cycles = self.irq_off_max_cycles.max(other.irq_off_max_cycles);
+        let cycles = &mut self.sync_held_max_cycles;
+        *cycles = other.sync_held_max_cycles.max(*cycles);
         self.burst_gap_max_bits = self.burst_gap_max_bits.max(other.burst_gap_max_bits);
         self.sdo_exchanges_per_s = self.sdo_exchanges_per_s.min(other.sdo_exchanges_per_s);
         let stack = &mut self.stack_high_water_bytes;
@@ -182,6 +204,10 @@ impl Figures {
         let (first_limit, last_limit) = (first_request_cycles as f64, last_request_cycles as f64);
         at_most("cycles to the first request of a SYNC", first, first_limit);
         at_most("cycles to the last request of a SYNC", last, last_limit);
+        let off = self.irq_off_max_cycles as f64;
+        at_most("cycles with interrupts off", off, HELD_CYCLES);
+        let held = self.sync_held_max_cycles as f64;
+        at_most("cycles in which a transmit request holds SYNC back", held, HELD_CYCLES);
         let gap = self.burst_gap_max_bits;
         at_most("silence within a burst [bits]", gap, burst_gap_bits);
         let stack = f64::from(self.stack_high_water_bytes);
