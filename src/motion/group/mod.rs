@@ -198,8 +198,11 @@ impl<const N: usize> Group<N> {
     ) {
         self.now += self.config.cycle;
         self.t = (self.t + 1).min(LONGEST_T);
+        let follows = !matches!(self.state, GroupState::Idle | GroupState::Faulted);
         for (axis, feedback) in self.axes.iter_mut().zip(feedback) {
-            axis.look(self.t);
+            if follows {
+                axis.look(self.t);
+            }
             if let Some(state) = axis.hear(feedback) {
                 let axis = axis.n;
                 self.events.report(GroupEvent::AxisState { axis, state });
