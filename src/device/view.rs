@@ -5,6 +5,7 @@ use super::Board;
 use super::Event;
 use super::dictionary::Dictionary;
 use super::lookup::Found;
+use super::node_record::{NO_EMERGENCY, NOT_IN_THE_NETWORK};
 use super::pdo::Mirrored;
 use super::settings::RESTORE_ALL;
 use super::table::Item;
@@ -119,7 +120,7 @@ impl<'a, B: Board, const N: usize> View<'a, B, N> {
                 .copied()
                 .unwrap_or(0),
             Item::RestoreConfiguration => known.map_or(0, |_| RESTORE_ALL).into(),
-            Item::BootLetter => record.map_or(0, |record| record.status.letter()).into(),
+            Item::BootLetter => record.map_or(0, |record| record.status.letter).into(),
             Item::EmcyCount => record.map_or(0, |record| record.emcy.len() as u32),
             Item::EmcyHistory => {
                 let emcy = record.and_then(|record| record.emcy.get(found.n()));
@@ -247,7 +248,7 @@ impl<B: Board, const N: usize> ObjectDictionary for View<'_, B, N> {
                         concise_dcf(|| network::plan(network, node), &mut window);
                     }
                     (Item::ConciseDcf, None) => return Err(AbortCode::NO_DATA),
-                    (_, None) => window.text("not in the network"),
+                    (_, None) => window.packed(NOT_IN_THE_NETWORK),
                     (Item::BootWords, Some((node, record))) => {
                         window.text(node.name);
                         window.text(": ");
@@ -257,10 +258,10 @@ impl<B: Board, const N: usize> ObjectDictionary for View<'_, B, N> {
                         Some(emcy) => {
                             window.hexadecimal(emcy.code.0);
                             window.text("h (");
-                            window.packed(&emcy.code.packed_text());
+                            window.spell(&emcy.code.packed_text());
                             window.text(")");
                         }
-                        None => window.text("no emergency"),
+                        None => window.packed(NO_EMERGENCY),
                     },
                 }
                 return Ok(window.chunk());

@@ -1,5 +1,6 @@
 //! Reading a piece of something that is made anew each time.
 
+use crate::emcy;
 use crate::network::ConfigWrite;
 use crate::od::Chunk;
 use crate::words::PackedText;
@@ -36,7 +37,12 @@ impl Window<'_> {
         self.put(text.as_bytes());
     }
 
-    pub(super) fn packed(&mut self, text: &PackedText) {
+    /// A text by its number.
+    pub(super) fn packed(&mut self, number: u8) {
+        self.spell(&emcy::other_text(number));
+    }
+
+    pub(super) fn spell(&mut self, text: &PackedText) {
         text.spell(&mut |letter| self.put(&[letter]));
     }
 

@@ -1,4 +1,5 @@
-//! The words of the emergency error codes.
+//! The words of the emergency error codes; and, because texts that are packed together
+//! take less, all others that the object dictionary has for people.
 
 use super::EmcyCode;
 use crate::words::{Packed, PackedText, in_words, packed};
@@ -22,7 +23,32 @@ macro_rules! texts {
 
         const RANGES: &[(u16, u16)] = &[$(($first, $last)),*];
 
-        packed!(WORDS: $($text,)* "unknown error, treated as a fault");
+        packed!(
+            WORDS: $($text,)* "unknown error, treated as a fault",
+            "not started yet",
+            "boot-up frame awaited",
+            "identity is checked",
+            "configuring, ",
+            "lost, to be booted again",
+            "configured, heartbeat awaited",
+            "ready to be started",
+            "operational",
+            "was operational already and is left running",
+            "not in the list of this master",
+            "no boot-up frame",
+            "restarts again and again",
+            "no answer to an access",
+            "an access was refused",
+            "wrong answer to an access",
+            "not the expected device",
+            "does not tell its NMT state",
+            "no heartbeat after the configuration",
+            "not operational after NMT start",
+            "not in the network",
+            "no emergency",
+            " (boot status ",
+            " writes"
+        );
     };
 }
 
@@ -206,11 +232,44 @@ const fn entries() -> [Entry; RANGES.len()] {
     entries
 }
 
-/// Bytes of the last words.
-const UNKNOWN: u8 = match WORDS.lengths {
-    [.., last] => *last,
-    [] => 0,
+/// Bytes of the words behind those of the codes.
+const UNKNOWN: u8 = match WORDS.lengths.split_at(RANGES.len()) {
+    (_, [unknown, ..]) => *unknown,
+    _ => 0,
 };
+
+/// How many texts are not of emergencies.
+const OTHERS: usize = 23;
+
+/// Their lengths, and where the first begins.
+static OTHER_LENGTHS: [u8; OTHERS] = others().0;
+const OTHERS_START: usize = others().1;
+
+/// The text with this number of those that are not of emergencies.
+pub(crate) fn other(number: u8) -> PackedText {
+    let (mut start, mut len) = (OTHERS_START, 0);
+    for next in OTHER_LENGTHS.iter().take(usize::from(number) + 1) {
+        start += len;
+        len = usize::from(*next);
+    }
+    WORDS.text(start, len)
+}
+
+#[expect(clippy::indexing_slicing, reason = "evaluated by the compiler only")]
+const fn others() -> ([u8; OTHERS], usize) {
+    let (mut lengths, mut start) = ([0; OTHERS], 0);
+    let first = RANGES.len() + 1;
+    let mut n = 0;
+    while n < first {
+        start += WORDS.lengths[n] as usize;
+        n += 1;
+    }
+    while n < WORDS.lengths.len() {
+        lengths[n - first] = WORDS.lengths[n];
+        n += 1;
+    }
+    (lengths, start)
+}
 
 #[cfg(test)]
 mod tests {

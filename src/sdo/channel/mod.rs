@@ -477,7 +477,12 @@ impl Channel {
     }
 
     /// Hands received bytes on, keeping to the size that was announced.
-    fn take(&mut self, data: &[u8], last: bool, payload: &mut dyn Payload) -> Result<(), AbortCode> {
+    fn take(
+        &mut self,
+        data: &[u8],
+        last: bool,
+        payload: &mut dyn Payload,
+    ) -> Result<(), AbortCode> {
         let offset = self.done;
         let received = offset.checked_add(data.len() as u32);
         let received = received.ok_or(AbortCode::TOO_LONG)?;
