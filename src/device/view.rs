@@ -14,7 +14,7 @@ use crate::emcy::EmcyCobId;
 use crate::id::{Address, CobId, FunctionCode, NodeId};
 use crate::network;
 use crate::nmt::{Command, NodeControl, Target};
-use crate::od::{Access, Chunk, DataType, Entry, ObjectDictionary, Part, Value, read_bytes};
+use crate::od::{Access, Chunk, DataType, Entry, ObjectDictionary, Part, Value};
 use crate::pdo::Direction;
 use crate::sdo::AbortCode;
 use crate::time::Instant;
@@ -236,40 +236,35 @@ impl<B: Board, const N: usize> ObjectDictionary for View<'_, B, N> {
         dictionary.find(at, &mut found)?;
         let known = found.node.and_then(|id| dictionary.node(id));
         let description = &dictionary.description;
-        let text = match found.item {
-            Item::DeviceName => description.name,
-            Item::HardwareVersion => description.hardware,
-            Item::SoftwareVersion => description.software,
-            Item::ConciseDcf | Item::BootWords | Item::EmcyWords => {
-                let mut window = Window::new(offset, buf);
-                match (found.item, known) {
-                    (Item::ConciseDcf, Some((node, _))) => {
-                        let network = dictionary.network;
-                        concise_dcf(|| network::plan(network, node), &mut window);
-                    }
-                    (Item::ConciseDcf, None) => return Err(AbortCode::NO_DATA),
-                    (_, None) => window.packed(NOT_IN_THE_NETWORK),
-                    (Item::BootWords, Some((node, record))) => {
-                        window.text(node.name);
-                        window.text(": ");
-                        record.status.write(&mut window);
-                    }
-                    (_, Some((_, record))) => match record.emcy.get(0) {
-                        Some(emcy) => {
-                            window.hexadecimal(emcy.code.0);
-                            window.text("h (");
-                            window.spell(&emcy.code.packed_text());
-                            window.text(")");
-                        }
-                        None => window.packed(NO_EMERGENCY),
-                    },
-                }
-                return Ok(window.chunk());
+        let window = &mut Window::new(offset, buf);
+        match (found.item, known) {
+            (Item::DeviceName, _) => window.text(description.name),
+            (Item::HardwareVersion, _) => window.text(description.hardware),
+            (Item::SoftwareVersion, _) => window.text(description.software),
+            (Item::ConciseDcf, Some((node, _))) => {
+                let network = dictionary.network;
+                concise_dcf(|| network::plan(network, node), window);
             }
-            Item::Board => return self.board.read(at, offset, buf),
+            (Item::ConciseDcf, None) => return Err(AbortCode::NO_DATA),
+            (Item::BootWords | Item::EmcyWords, None) => window.packed(NOT_IN_THE_NETWORK),
+            (Item::BootWords, Some((node, record))) => {
+                window.text(node.name);
+                window.text(": ");
+                record.status.write(window);
+            }
+            (Item::EmcyWords, Some((_, record))) => match record.emcy.get(0) {
+                Some(emcy) => {
+                    window.hexadecimal(emcy.code.0);
+                    window.text("h (");
+                    window.spell(&emcy.code.packed_text());
+                    window.text(")");
+                }
+                None => window.packed(NO_EMERGENCY),
+            },
+            (Item::Board, _) => return self.board.read(at, offset, buf),
             _ => return Err(AbortCode::UNSUPPORTED_ACCESS),
-        };
-        Ok(read_bytes(text.as_bytes(), offset, buf))
+        }
+        Ok(window.chunk())
     }
 
     /// Of the entries without a fixed size only the board's can be written.

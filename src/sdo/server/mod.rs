@@ -24,6 +24,8 @@ const NOWHERE: Address = Address::new(0, 0);
 
 /// An SDO server (CiA 301, 7.2.4, 7.5.2.33).
 #[derive(Clone, Debug)]
+// In this order, so that what is used most is near: it takes shorter instructions.
+#[repr(C)]
 pub struct Server {
     request: CobId,
     response: CobId,
