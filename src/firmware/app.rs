@@ -254,12 +254,20 @@ mod app {
     /// Sleeps until the next interrupt.
     #[idle(shared = [&clock_us])]
     fn idle(cx: idle::Context) -> ! {
+        if !measured::ON {
+            loop {
+                cortex_m::asm::wfi();
+            }
+        }
+        let mut asleep: u32 = 0;
         loop {
             // What wakes it runs when the time is taken.
             cortex_m::interrupt::free(|_| {
                 let since = cx.shared.clock_us.now();
                 cortex_m::asm::wfi();
-                measured::slept(cx.shared.clock_us.now().wrapping_sub(since));
+                let slept = cx.shared.clock_us.now().wrapping_sub(since);
+                asleep = asleep.wrapping_add(slept);
+                measured::slept(asleep);
             });
         }
     }
@@ -281,7 +289,7 @@ mod app {
         // What may go after the SYNC.
         lines::send_now();
         roll::check_in(Task::SyncTick);
-        measured::give(Figure::SyncTick, cx.shared.phase.ticks());
+        measured::give(Figure::SyncTick, measured::ticks(*cx.shared.phase));
     }
 
     /// Refills the transmit buffers and empties the receive FIFOs.
@@ -349,7 +357,7 @@ mod app {
         shared = [od, lines, control, commands, &phase]
     )]
     fn pdo_producer(mut cx: pdo_producer::Context) {
-        let begun = cx.shared.phase.ticks();
+        let begun = measured::ticks(*cx.shared.phase);
         if derived::WINDOW_US != 0 && cx.local.deadline.take_second() {
             lines::send_now();
         }
@@ -382,7 +390,9 @@ mod app {
                 if axes.write(&cycle, commands, &mut shared.lines) {
                     lines::send_now();
                 }
-                measured::give(Figure::Cycle, shared.phase.elapsed_us());
+                if measured::ON {
+                    measured::give(Figure::Cycle, shared.phase.elapsed_us());
+                }
             }
         });
         while let Some(event) = axes.take_event() {
@@ -391,7 +401,7 @@ mod app {
             }
             wake::want();
         }
-        measured::give(Figure::PdoProducer, cx.shared.phase.ticks_since(begun));
+        measured::ran(Figure::PdoProducer, *cx.shared.phase, begun);
     }
 
     /// The worst of the controllers' states.
@@ -417,7 +427,7 @@ mod app {
     )]
     fn network(mut cx: network::Context) {
         let local = cx.local;
-        let begun = cx.shared.phase.ticks();
+        let begun = measured::ticks(*cx.shared.phase);
         local.tick.acknowledge();
         let counter = local.microseconds.now();
         CLOCK.keep(counter);
@@ -490,8 +500,10 @@ mod app {
                 .shared
                 .lines
                 .lock(|lines| lines.iter().map(|line| line.planned.overflows()).sum());
-            measured::second(local.asleep, overruns);
-            publish(local.news_to, News::Measured);
+            if measured::ON {
+                measured::second(local.asleep, overruns);
+                publish(local.news_to, News::Measured);
+            }
             let counts = Counts::now(overruns, wrong_length, overflows);
             if counts != *local.counts {
                 *local.counts = counts;
@@ -503,7 +515,7 @@ mod app {
         if roll::complete() {
             local.watchdog.feed();
         }
-        measured::give(Figure::Network, cx.shared.phase.ticks_since(begun));
+        measured::ran(Figure::Network, *cx.shared.phase, begun);
     }
 
     /// Boots, checks and configures the nodes, all at once, starts them, and

@@ -131,13 +131,13 @@ fn answering(config: DriveConfig, sdo_latency: Spread) -> DriveConfig {
 
 impl Case {
     /// Its description.
-    pub(super) fn path(&self) -> PathBuf {
+    pub(in crate::bench) fn path(&self) -> PathBuf {
         let file = format!("{}.toml", self.name);
         cargo::workspace().join(FOLDER).join(file)
     }
 
     /// What is simulated: motion all the time.
-    pub(super) fn scenario(&self, machine: &Machine, seed: u64) -> Scenario {
+    pub(in crate::bench) fn scenario(&self, machine: &Machine, seed: u64) -> Scenario {
         let scenario = Scenario::new(seed, Time::MAX);
         let scenario = scenario.restless().tuned(self.tuned);
         if !self.disturbed {

@@ -1,5 +1,7 @@
 //! The figures of a scenario, and whether they reach its limits.
 
+use canmaster_sim::board::BoardStats;
+use canmaster_sim::bus::WireRecord;
 use canmaster_sim::judge::bus::{judge_running, syncs};
 use canmaster_sim::judge::skew::skew_us;
 use canmaster_sim::judge::{BusFigures, Outcome, RealTime, realtime};
@@ -8,6 +10,8 @@ use canmaster_sim::world::{BusRecord, Record};
 use serde::Serialize;
 
 use super::case::{Case, Limits};
+use super::own::Own;
+use super::session::Span;
 
 /// While a frame is handed to a controller.
 const HELD_CYCLES: f64 = 40.0;
@@ -40,9 +44,13 @@ pub(crate) struct Figures {
     /// SYNC and the PDOs of every cycle at worst, on the fullest bus.
     wire_bound_us: u32,
     stack_high_water_bytes: u32,
+    /// What the board says of itself.
+    own: Own,
     seeds: u64,
     simulated_s: f64,
     wall_s: f64,
+    /// Simulated over wall.
+    speed: f64,
     /// Objects of the board that somebody else has read meanwhile.
     outside_transfers: usize,
     /// What went wrong, apart from limits that were missed.
@@ -52,8 +60,10 @@ pub(crate) struct Figures {
 /// What a run leaves behind, and since when it is looked at.
 pub(super) struct Measured {
     pub(super) record: Record,
-    pub(super) from: Time,
-    pub(super) to: Time,
+    pub(super) span: Span,
+    /// Of the board, in that span.
+    pub(super) stats: BoardStats,
+    pub(super) own: Own,
     /// See [`Figures`].
     pub(super) wire_bound_us: u32,
     pub(super) wall_s: f64,
@@ -62,14 +72,20 @@ pub(super) struct Measured {
     pub(super) refused: Vec<String>,
 }
 
+/// What began between two moments.
+pub(in crate::bench) fn between(wire: &[WireRecord], from: Time, to: Time) -> &[WireRecord] {
+    let place = |at: Time| wire.partition_point(|record| record.sof < at);
+    wire.get(place(from)..place(to)).unwrap_or_default()
+}
+
 /// One bus between two moments.
 fn of_bus(bus: &BusRecord, measured: &Measured, index: usize) -> (BusFigures, RealTime) {
-    let place = |at: Time| bus.wire.partition_point(|record| record.sof < at);
-    let records = &bus.wire[place(measured.from)..place(measured.to)];
+    let Span { from, to, .. } = measured.span;
+    let records = between(&bus.wire, from, to);
     let machine = &measured.record.machine;
     let traffic = machine.traffic(&machine.segments()[index]);
     (
-        judge_running(records, &traffic, measured.to),
+        judge_running(records, &traffic, to),
         realtime::judge(records, &traffic, bus.board),
     )
 }
@@ -77,7 +93,7 @@ fn of_bus(bus: &BusRecord, measured: &Measured, index: usize) -> (BusFigures, Re
 /// How far the SYNCs of one cycle are apart in the time that is looked at: while the
 /// nodes boot, their heartbeats may be in the way of one bus's.
 fn skew(measured: &Measured) -> f64 {
-    let seen = measured.from..measured.to;
+    let seen = measured.span.from..measured.span.to;
     let of_bus = |bus: &BusRecord| -> Vec<Time> {
         let all = syncs(&bus.wire).into_iter();
         all.filter(|at| seen.contains(at)).collect()
@@ -88,7 +104,7 @@ fn skew(measured: &Measured) -> f64 {
 
 impl Figures {
     pub(super) fn new(case: &Case, measured: &Measured) -> Figures {
-        let record = &measured.record;
+        let (record, board) = (&measured.record, &measured.stats);
         let buses = record.buses.iter().enumerate();
         let buses: Vec<_> = buses
             .map(|(index, bus)| of_bus(bus, measured, index))
@@ -97,7 +113,8 @@ impl Figures {
         let worst = |value: fn(&RealTime) -> f64| {
             buses.iter().map(|(_, bus)| value(bus)).fold(0.0, f64::max)
         };
-        let span = (measured.to - measured.from).as_secs_f64();
+        let Span { from, to, .. } = measured.span;
+        let span = (to - from).as_secs_f64();
         let answers = buses.iter().map(|(_, bus)| bus.sdo_answers).min();
         let mut histogram = Vec::new();
         for (_, bus) in &buses {
@@ -108,35 +125,48 @@ impl Figures {
             failures.push(record.verdict.reason.clone());
         }
         failures.extend(record.complaints.iter().cloned());
+        let network = record.machine.network();
+        let all_answers = buses.iter().map(|(_, bus)| bus.sdo_answers).sum();
+        let own = measured.own.clone().beside(
+            &record.buses,
+            &measured.span,
+            Time::from(network.cycle),
+            network.bit_rate,
+            board,
+            all_answers,
+        );
+        failures.extend(own.complaints());
         Figures {
             name: case.name,
-            cycle_us: record.machine.network().cycle.as_micros(),
+            cycle_us: network.cycle.as_micros(),
             missed: all.missed,
-            overruns: record.board.rx_overruns.iter().sum(),
+            overruns: board.rx_overruns.iter().sum(),
             jitter_pp_us: worst(|bus| bus.jitter_pp_us),
             jitter_histogram: histogram,
             late_unexplained: buses.iter().map(|(_, bus)| bus.unexplained).sum(),
             skew_us: skew(measured),
             load_max: all.load_max,
-            cpu_load: record.board.cpu_load(),
-            sync_isr_worst_cycles: record.board.sync.worst_last_cycles,
-            sync_isr_first_cycles: record.board.sync.worst_first_cycles,
-            irq_off_max_cycles: record.board.irq_off_max_cycles,
-            sync_held_max_cycles: record.board.sync_masked_max_cycles,
+            cpu_load: board.cpu_load(),
+            sync_isr_worst_cycles: board.sync.worst_last_cycles,
+            sync_isr_first_cycles: board.sync.worst_first_cycles,
+            irq_off_max_cycles: board.irq_off_max_cycles,
+            sync_held_max_cycles: board.sync_masked_max_cycles,
             burst_gap_max_bits: worst(|bus| bus.burst_gap_bits),
             sdo_exchanges_per_s: answers.unwrap_or(0) as f64 / span,
             wire_bound_us: measured.wire_bound_us,
-            stack_high_water_bytes: record.board.stack_high_water_bytes,
+            stack_high_water_bytes: board.stack_high_water_bytes,
+            own,
             seeds: 1,
             simulated_s: span,
             wall_s: measured.wall_s,
+            speed: speed(span, measured.wall_s),
             outside_transfers: measured.outside_transfers,
             failures,
         }
     }
 
     /// The worst of both.
-    pub(super) fn and(mut self, other: Figures) -> Figures {
+    pub(crate) fn and(mut self, other: Figures) -> Figures {
         self.missed += other.missed;
         self.overruns += other.overruns;
         self.jitter_pp_us = self.jitter_pp_us.max(other.jitter_pp_us);
@@ -156,9 +186,11 @@ impl Figures {
         self.sdo_exchanges_per_s = self.sdo_exchanges_per_s.min(other.sdo_exchanges_per_s);
         let stack = &mut self.stack_high_water_bytes;
         *stack = other.stack_high_water_bytes.max(*stack);
+        self.own = self.own.and(other.own);
         self.seeds += other.seeds;
         self.simulated_s += other.simulated_s;
         self.wall_s += other.wall_s;
+        self.speed = speed(self.simulated_s, self.wall_s);
         self.outside_transfers += other.outside_transfers;
         self.failures.extend(other.failures);
         self
@@ -166,7 +198,7 @@ impl Figures {
 
     /// How much faster than the clock on the wall it was.
     pub(super) fn times_real_time(&self) -> f64 {
-        self.simulated_s / self.wall_s.max(f64::MIN_POSITIVE)
+        self.speed
     }
 
     /// The limits that were missed, in words.
@@ -231,12 +263,13 @@ impl Figures {
     }
 
     /// What stands over the columns of [`cells`](Self::cells).
-    pub(super) const HEADING: [&str; 14] = [
+    pub(super) const HEADING: [&str; 15] = [
         "scenario",
         "cycle [us]",
         "missed",
         "overruns",
         "jitter [us]",
+        "own [us]",
         "skew [us]",
         "load",
         "CPU",
@@ -245,7 +278,7 @@ impl Figures {
         "gap [bits]",
         "SDO/s",
         "bound [us]",
-        "x real time",
+        "speed",
     ];
 
     /// For the table.
@@ -257,6 +290,7 @@ impl Figures {
             self.missed.to_string(),
             self.overruns.to_string(),
             format!("{:.2}", self.jitter_pp_us),
+            format!("{:.0}", self.own.jitter_pp_us),
             format!("{:.2}", self.skew_us),
             percent(self.load_max),
             percent(self.cpu_load),
@@ -268,6 +302,10 @@ impl Figures {
             format!("{:.2}", self.times_real_time()),
         ]
     }
+}
+
+fn speed(simulated_s: f64, wall_s: f64) -> f64 {
+    simulated_s / wall_s.max(f64::MIN_POSITIVE)
 }
 
 /// The stack may be so deep.
