@@ -56,7 +56,7 @@ impl<'a, B: Board, const N: usize> View<'a, B, N> {
         let record = known.map(|(_, record)| record);
         let number: u32 = match found.item {
             Item::Highest => found.sub.into(),
-            Item::Setting(setting) => dictionary.settings.get(setting),
+            Item::Setting => dictionary.settings.get(found.setting),
             Item::DeviceType => dictionary.description.device_type,
             Item::ErrorRegister => dictionary.errors.register().0.into(),
             Item::Status => dictionary.status,
@@ -197,7 +197,7 @@ impl<B: Board, const N: usize> ObjectDictionary for View<'_, B, N> {
         let node = found.node;
         let target = node.map_or(Target::All, Target::Node);
         match found.item {
-            Item::Setting(setting) => return dictionary.change(setting, number),
+            Item::Setting => return dictionary.change(found.setting, number),
             // Only 0 can be written, which clears the field.
             Item::ErrorCount | Item::EmcyCount if number != 0 => {
                 return Err(AbortCode::VALUE_RANGE);
