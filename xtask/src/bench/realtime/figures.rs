@@ -44,8 +44,8 @@ pub(crate) struct Figures {
     /// SYNC and the PDOs of every cycle at worst, on the fullest bus.
     wire_bound_us: u32,
     stack_high_water_bytes: u32,
-    /// What the board says of itself.
-    own: Own,
+    /// What the board says of itself, if it was asked.
+    own: Option<Own>,
     seeds: u64,
     simulated_s: f64,
     wall_s: f64,
@@ -63,7 +63,7 @@ pub(super) struct Measured {
     pub(super) span: Span,
     /// Of the board, in that span.
     pub(super) stats: BoardStats,
-    pub(super) own: Own,
+    pub(super) own: Option<Own>,
     /// See [`Figures`].
     pub(super) wire_bound_us: u32,
     pub(super) wall_s: f64,
@@ -127,15 +127,17 @@ impl Figures {
         failures.extend(record.complaints.iter().cloned());
         let network = record.machine.network();
         let all_answers = buses.iter().map(|(_, bus)| bus.sdo_answers).sum();
-        let own = measured.own.clone().beside(
-            &record.buses,
-            &measured.span,
-            Time::from(network.cycle),
-            network.bit_rate,
-            board,
-            all_answers,
-        );
-        failures.extend(own.complaints());
+        let own = measured.own.clone().map(|own| {
+            own.beside(
+                &record.buses,
+                &measured.span,
+                Time::from(network.cycle),
+                network.bit_rate,
+                board,
+                all_answers,
+            )
+        });
+        failures.extend(own.iter().flat_map(Own::complaints));
         Figures {
             name: case.name,
             cycle_us: network.cycle.as_micros(),
@@ -186,7 +188,7 @@ impl Figures {
         self.sdo_exchanges_per_s = self.sdo_exchanges_per_s.min(other.sdo_exchanges_per_s);
         let stack = &mut self.stack_high_water_bytes;
         *stack = other.stack_high_water_bytes.max(*stack);
-        self.own = self.own.and(other.own);
+        self.own = self.own.zip(other.own).map(|(all, own)| all.and(own));
         self.seeds += other.seeds;
         self.simulated_s += other.simulated_s;
         self.wall_s += other.wall_s;
@@ -290,7 +292,10 @@ impl Figures {
             self.missed.to_string(),
             self.overruns.to_string(),
             format!("{:.2}", self.jitter_pp_us),
-            format!("{:.0}", self.own.jitter_pp_us),
+            match &self.own {
+                Some(own) => format!("{:.0}", own.jitter_pp_us),
+                None => "-".to_string(),
+            },
             format!("{:.2}", self.skew_us),
             percent(self.load_max),
             percent(self.cpu_load),

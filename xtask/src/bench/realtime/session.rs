@@ -71,7 +71,10 @@ pub(crate) fn run(
     let master = world.machine().network().master.node;
     let mut client = Client::new(world, master);
     let before = client.world.now();
-    let counters = Counters::begin(&mut client)?;
+    let counters = match case.asked {
+        true => Some(Counters::begin(&mut client)?),
+        false => None,
+    };
     client.world.clear_stats();
     let started = Instant::now();
     let from = client.world.now();
@@ -91,7 +94,13 @@ pub(crate) fn run(
     let to = client.world.now();
     let wall_s = started.elapsed().as_secs_f64();
     let stats = client.world.board().stats();
-    let (own, after) = Own::read(&mut client, counters)?;
+    let (own, after) = match counters {
+        Some(counters) => {
+            let (own, after) = Own::read(&mut client, counters)?;
+            (Some(own), after)
+        }
+        None => (None, to),
+    };
     let (transfers, refused) = outsider
         .map(|outsider| (outsider.transfers, outsider.refused))
         .unwrap_or_default();
