@@ -349,7 +349,8 @@ mod app {
     /// Trigger: pended by the last expected TPDO, or TIM3 compare at the
     /// deadline, whichever is first; once per cycle. Budget: 30 000 cycles. If it
     /// has not run before the next SYNC, that cycle is an overrun: it is counted,
-    /// and the drives keep the set-points of the cycle before.
+    /// and the drives keep the set-points of the cycle before. Several in a row stop
+    /// the group (`design::LATE_CYCLES_MAX`).
     #[task(
         binds = TIM3,
         priority = 3,
@@ -381,11 +382,12 @@ mod app {
         let shared = &mut cx.shared;
         // Their ceiling is the priority of this task: nobody waits for them.
         (&mut shared.control, &mut shared.commands).lock(|shared_control, commands| {
-            axes.step(&control, commands);
+            axes.step(&cycle, &control, commands);
             shared_control.axes_enabled = axes.enabled(&control);
             if deadline.elapsed_us() > control.latest_us {
                 // What comes after the window of the SYNC is not sent any more.
                 counters::RPDO_REPLACED.add(1);
+                axes.skip();
             } else if control.leads() && !control.bus_off {
                 if axes.write(&cycle, commands, &mut shared.lines) {
                     lines::send_now();

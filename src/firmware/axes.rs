@@ -7,8 +7,9 @@ use crate::{
 };
 use canmaster::{
     cia402::StatusWord,
-    master::{Cycle, MasterOd, Ramps, RpdoImage, TPDOS_PER_AXIS, TpdoSlot},
-    motion::{AxisCommand, AxisFeedback, Group, GroupEvent, GroupState, Request, Speedometer},
+    design,
+    master::{Cycle, MasterOd, Overload, Ramps, RpdoImage, TPDOS_PER_AXIS, TpdoSlot},
+    motion::{AxisCommand, AxisFeedback, FaultCause, Group, GroupEvent, GroupState, Request, Speedometer},
     network::Network,
 };
 use rtic::Mutex;
@@ -24,12 +25,18 @@ const SPEEDOMETERS: [Speedometer; AXES] = {
     all
 };
 
+/// No axis has this number.
+const ALL_AXES: usize = usize::MAX;
+
 /// The group with what surrounds it.
 pub(crate) struct Axes {
     network: &'static Network,
     group: &'static mut Group<AXES>,
     feedback: [AxisFeedback; AXES],
     ramps: Ramps<AXES>,
+    overload: Overload,
+    /// RPDOs of the last cycle did not get out.
+    unsent: bool,
     speed: [Speedometer; AXES],
 }
 
@@ -40,6 +47,8 @@ impl Axes {
             group,
             feedback: [AxisFeedback::default(); AXES],
             ramps: Ramps::new(),
+            overload: Overload::new(design::LATE_CYCLES_MAX),
+            unsent: false,
             speed: SPEEDOMETERS,
         }
     }
@@ -62,8 +71,19 @@ impl Axes {
 
     /// Steps the group. A press of the button releases the motion, and stops it
     /// when there is one.
-    pub(crate) fn step(&mut self, control: &Control, commands: &mut [AxisCommand; AXES]) {
-        let moving = self.group.state() == GroupState::Moving;
+    pub(crate) fn step(
+        &mut self,
+        cycle: &Cycle,
+        control: &Control,
+        commands: &mut [AxisCommand; AXES],
+    ) {
+        let state = self.group.state();
+        let moving = state == GroupState::Moving;
+        let unsent = core::mem::take(&mut self.unsent);
+        let late = self.overload.cycle(cycle.passed, unsent);
+        let led = !matches!(state, GroupState::Idle | GroupState::Faulted);
+        let late = late.filter(|_| led && state != GroupState::FaultStop);
+        let late = late.map(|cycles| (ALL_AXES, FaultCause::CyclesLate { cycles }));
         let request = Request {
             network_ready: control.network_ready
                 && control.leads()
@@ -71,7 +91,7 @@ impl Axes {
                 && !control.cycle_differs,
             release: control.pressed && !moving,
             stop: control.pressed && moving,
-            fault: control.fault,
+            fault: control.fault.or(late),
             absent: !control.operational,
         };
         self.group.step(request, &self.feedback, commands);
@@ -93,6 +113,11 @@ impl Axes {
         self.group.take_event()
     }
 
+    /// It is too late for the RPDOs of this cycle.
+    pub(crate) const fn skip(&mut self) {
+        self.unsent = true;
+    }
+
     /// Writes the RPDOs of the next cycle. Whether any of them may go before the
     /// next SYNC.
     pub(crate) fn write(
@@ -104,7 +129,7 @@ impl Axes {
         let (mut any, mut image) = (false, RpdoImage::default());
         lines.lock(|lines| {
             for line in lines.iter_mut() {
-                line.begin(cycle.sync);
+                self.unsent |= line.begin(cycle.sync);
             }
         });
         let due = self.ramps.due(commands);

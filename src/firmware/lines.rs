@@ -78,6 +78,8 @@ pub struct Line {
     second: bool,
     /// The SYNC after whose TPDOs they were made.
     made_after: u32,
+    /// RPDOs were dropped since [`begin`](Line::begin) was called.
+    late: bool,
     /// Everything else.
     pub(crate) planned: TxQueue<{ derived::TX_QUEUE }>,
     /// The cycle that `left` is for.
@@ -97,23 +99,28 @@ impl Line {
             early: [const { Burst::new() }; 2],
             second: false,
             made_after: 0,
+            late: false,
             planned: TxQueue::new(),
             cycle: 0,
             left: 0,
         }
     }
 
-    /// Takes the RPDOs of another cycle. Those that were not sent are counted.
-    pub(crate) fn begin(&mut self, sync: u32) {
-        self.drop_late();
+    /// Takes the RPDOs of another cycle. Whether some of those before were not sent;
+    /// these are counted.
+    pub(crate) fn begin(&mut self, sync: u32) -> bool {
+        let left = self.burst.begin();
+        self.drop_late(left);
         if EARLY {
             self.early(false).begin();
         }
         self.made_after = sync;
+        core::mem::take(&mut self.late)
     }
 
-    fn drop_late(&mut self) {
-        counters::RPDO_REPLACED.add(self.burst.begin() as u32);
+    fn drop_late(&mut self, left: usize) {
+        counters::RPDO_REPLACED.add(left as u32);
+        self.late |= left != 0;
     }
 
     /// An RPDO of every cycle, to be sent in its own or after the next SYNC.
@@ -155,7 +162,8 @@ impl Line {
         let syncs = SYNCS.load(Relaxed);
         if EARLY {
             if (!producing || self.made_after != syncs) && !self.early(false).is_over() {
-                counters::RPDO_REPLACED.add(self.early(true).begin() as u32);
+                let left = self.early(true).begin();
+                self.drop_late(left);
                 self.second = !self.second;
             }
             // Before the planned frames, which would take a buffer from them for long.
@@ -168,7 +176,8 @@ impl Line {
         }
         if producing && self.made_after != syncs {
             // Made too late for its own cycle, nothing is sent in the next.
-            self.drop_late();
+            let left = self.burst.begin();
+            self.drop_late(left);
             return None;
         }
         self.burst.next(pending).copied()

@@ -69,21 +69,22 @@ const fn is_error_control(id: u16) -> bool {
 
 /// How urgent an identifier is: the lower, the more. Heartbeats come next to NMT:
 /// they are rare, and the drives stop without the master's, however much else
-/// there is to send. SDO requests are all alike, or those to the highest node-IDs
-/// would wait for longer than their timeout while the bus is full of the others.
+/// there is to send. SDO requests and answers are all alike, or those to the highest
+/// node-IDs would wait for longer than their timeout while the bus is full of the
+/// others, and all of them while a client reads the board's dictionary.
 const fn rank(id: CobId) -> u16 {
     let id = id.get();
     if is_error_control(id) {
         CobId::NMT.get() + 1
     } else if id >= SDO {
-        id & FUNCTION
+        SDO
     } else {
         id
     }
 }
 
 /// A queue of up to `N` frames: heartbeats first but for NMT, then the lowest
-/// identifier; SDO requests and equal identifiers first in, first out.
+/// identifier; SDO, LSS and equal identifiers first in, first out.
 #[derive(Debug, Default)]
 pub struct TxQueue<const N: usize> {
     /// The most urgent frame last.
@@ -221,10 +222,10 @@ mod tests {
         assert_eq!(next(&mut queue, &heartbeat), None);
         // LSS makes pauses by itself.
         let lss = [FREE, 0x7E5, FREE];
-        assert_eq!(next(&mut queue, &lss), Some((0x5FF, 0)));
         // Whoever came first.
-        assert_eq!(next(&mut queue, &NONE), Some((0x602, 0)));
+        assert_eq!(next(&mut queue, &lss), Some((0x602, 0)));
         assert_eq!(next(&mut queue, &NONE), Some((0x601, 0)));
+        assert_eq!(next(&mut queue, &NONE), Some((0x5FF, 0)));
     }
 
     #[test]

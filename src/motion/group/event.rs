@@ -81,6 +81,11 @@ pub enum FaultCause {
     LeftOperational,
     /// The network as a whole is no longer ready.
     NetworkLost,
+    /// Cycles in a row did not finish in time: the drives follow old commands.
+    CyclesLate {
+        /// So many.
+        cycles: u8,
+    },
 }
 
 in_words!(FaultCause {
@@ -108,6 +113,9 @@ in_words!(FaultCause {
     FaultCause::Emergency { code } => ("emergency {:#06x}", code),
     FaultCause::LeftOperational => ("the node left NMT operational"),
     FaultCause::NetworkLost => ("the network is no longer complete"),
+    FaultCause::CyclesLate { cycles } => (
+        "{} cycles in a row did not finish in time: see 2F20h, take a longer cycle_us", cycles
+    ),
 });
 
 /// Why a release was not accepted. Nothing has been sent because of it.

@@ -83,7 +83,8 @@ pub struct Request {
     pub release: bool,
     /// Edge: ramp down to standby.
     pub stop: bool,
-    /// Edge: a fault seen elsewhere, with the axis counted from 0.
+    /// Edge: a fault seen elsewhere, with the axis counted from 0; a number that no
+    /// axis has: of all.
     pub fault: Option<(usize, FaultCause)>,
     /// Level: bit n leaves out axis n, whose optional node is not there. One that
     /// goes in motion is a fault; one that comes waits for standby.
