@@ -9,7 +9,9 @@ use canmaster::{
     cia402::StatusWord,
     design,
     master::{Cycle, MasterOd, Overload, Ramps, RpdoImage, TPDOS_PER_AXIS, TpdoSlot},
-    motion::{AxisCommand, AxisFeedback, FaultCause, Group, GroupEvent, GroupState, Request, Speedometer},
+    motion::{
+        AxisCommand, AxisFeedback, FaultCause, Group, GroupEvent, GroupState, Request, Speedometer,
+    },
     network::Network,
 };
 use rtic::Mutex;
