@@ -94,6 +94,7 @@ impl Axes {
             release: control.pressed && !moving,
             stop: control.pressed && moving,
             fault: control.fault.or(late),
+            passed: cycle.passed,
             absent: !control.operational,
         };
         self.group.step(request, &self.feedback, commands);

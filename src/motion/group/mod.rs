@@ -32,7 +32,7 @@ use super::profile::whole_cycles;
 use super::program::{self, PlanError, Step};
 use super::{Profile, Ramp, Reference};
 use crate::cia402::Goal;
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 
 /// Events kept until they are taken: enough for the busiest step, in which every
 /// one of six axes fails.
@@ -86,6 +86,9 @@ pub struct Request {
     /// Edge: a fault seen elsewhere, with the axis counted from 0; a number that no
     /// axis has: of all.
     pub fault: Option<(usize, FaultCause)>,
+    /// Cycles since the last step: more than one if some were missed, for the axes went
+    /// on meanwhile. 0 counts as 1.
+    pub passed: u32,
     /// Level: bit n leaves out axis n, whose optional node is not there. One that
     /// goes in motion is a fault; one that comes waits for standby.
     pub absent: u32,
@@ -197,8 +200,11 @@ impl<const N: usize> Group<N> {
         feedback: &[AxisFeedback; N],
         out: &mut [AxisCommand; N],
     ) {
-        self.now += self.config.cycle;
-        self.t = (self.t + 1).min(LONGEST_T);
+        let passed = request.passed.max(1);
+        let cycles = i32::try_from(passed).unwrap_or(LONGEST_T).min(LONGEST_T);
+        let us = self.config.cycle.as_micros().saturating_mul(passed);
+        self.now += Duration::from_micros(us);
+        self.t = (self.t + cycles).min(LONGEST_T);
         let follows = !matches!(self.state, GroupState::Idle | GroupState::Faulted);
         for (axis, feedback) in self.axes.iter_mut().zip(feedback) {
             if follows {
