@@ -59,7 +59,8 @@ impl Sender {
         };
         let pending = can::pending(controller, can::waiting(controller));
         let waits = holds(&pending, CobId::SYNC);
-        if waits || self.tx.transmit(controller, &self.sync).is_err() {
+        let buffers = can::Buffers::of(controller).filter(|_| !waits);
+        if buffers.is_none_or(|to| self.tx.transmit(to, &self.sync).is_err()) {
             counters::SYNC_NOT_SENT.add(1);
         }
     }
@@ -265,7 +266,10 @@ pub(crate) fn refill(
     sender: &mut impl Mutex<T = Sender>,
     phase: Phase,
 ) {
-    let Some(&controller) = CONTROLLERS.get(bus) else {
+    let Some((&controller, buffers)) = CONTROLLERS
+        .get(bus)
+        .and_then(|controller| Some((controller, can::Buffers::of(*controller)?)))
+    else {
         return;
     };
     let waiting = can::waiting(controller);
@@ -283,8 +287,8 @@ pub(crate) fn refill(
             let Some(frame) = line.next(bus, &pending, phase) else {
                 break;
             };
-            let element = element(&frame).made();
-            let sent = sender.lock(|sender| sender.tx.transmit(controller, &element));
+            let (element, to) = (element(&frame).made(), buffers.made());
+            let sent = sender.lock(|sender| sender.tx.transmit(to, &element));
             if let Some(place) = sent.ok().and_then(|place| pending.get_mut(place)) {
                 *place = frame.id().get();
             } else {

@@ -106,6 +106,52 @@ pub struct Tx {
     _only: (),
 }
 
+/// The transmit buffers of a controller, looked up.
+#[derive(Clone, Copy)]
+pub struct Buffers {
+    registers: *const RegisterBlock,
+    elements: *mut u32,
+    held: *const [AtomicU16; DEPTH],
+}
+
+impl Buffers {
+    /// Those of a controller. `None`: there is no such controller.
+    #[inline(always)]
+    pub fn of(controller: Controller) -> Option<Buffers> {
+        Some(Buffers {
+            registers: registers(controller),
+            elements: message_ram::tx_buffers(controller),
+            held: IDENTIFIERS.get(controller.index())?,
+        })
+    }
+
+    /// The same, looked up here: see [`Element::made`].
+    #[inline(always)]
+    pub fn made(self) -> Buffers {
+        let Buffers {
+            mut registers,
+            mut elements,
+            mut held,
+        } = self;
+        // SAFETY: no instruction; the compiler takes it for one that needs the three
+        // pointers, which are the same afterwards.
+        unsafe {
+            core::arch::asm!(
+                "/* {0} {1} {2} */",
+                inout(reg) registers,
+                inout(reg) elements,
+                inout(reg) held,
+                options(nomem, nostack, preserves_flags)
+            );
+        }
+        Buffers {
+            registers,
+            elements,
+            held,
+        }
+    }
+}
+
 /// Which buffers hold a frame that waits to be sent: bit n for buffer n. For any
 /// task: a frame that is requested meanwhile may be missing.
 #[inline(always)]
@@ -144,25 +190,21 @@ impl Tx {
     ///
     /// [`TransmitError::Full`]: nothing was changed.
     #[inline(always)]
-    pub fn transmit(&mut self, by: Controller, element: &Element) -> Result<usize, TransmitError> {
-        let status = registers(by).txfqs().read();
+    pub fn transmit(&mut self, by: Buffers, element: &Element) -> Result<usize, TransmitError> {
+        // SAFETY: both were made of references that are valid for ever.
+        let (registers, held) = unsafe { (&*by.registers, &*by.held) };
+        let status = registers.txfqs().read();
         let index = status.tfqpi().bits() as usize;
-        let held = IDENTIFIERS.get(by.index());
-        let (false, Some(held)) = (
-            status.tfqf().bit_is_set(),
-            held.and_then(|held| held.get(index)),
-        ) else {
+        let (false, Some(held)) = (status.tfqf().bit_is_set(), held.get(index)) else {
             return Err(TransmitError::Full);
         };
         held.store(element.identifier(), Relaxed);
         // SAFETY: the clock was switched on by `setup`; the index was checked
         // against three above; the put index names a buffer without a request;
         // `&mut self` is the only way to Tx buffers.
-        unsafe { message_ram::write_tx(by, index, element) };
+        unsafe { message_ram::write_tx(by.elements, index, element) };
         // SAFETY: a request bit of a buffer that has just been filled.
-        registers(by)
-            .txbar()
-            .write(|w| unsafe { w.bits(1 << index) });
+        registers.txbar().write(|w| unsafe { w.bits(1 << index) });
         Ok(index)
     }
 
