@@ -67,6 +67,7 @@ fn recorded() -> Vec<Step> {
             release: at == RELEASED || at == RELEASED_AGAIN,
             stop: at == STOPPED,
             fault: (at == FAULT).then_some((0, FaultCause::HeartbeatLost)),
+            passed: 1,
             absent: 0,
         };
         steps.push(Step {

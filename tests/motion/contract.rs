@@ -2,7 +2,9 @@
 
 use canmaster::cia402::{Command, ControlWord, State};
 use canmaster::motion::experiment::GROUP;
-use canmaster::motion::{FaultCause, GroupEvent, GroupState, Refusal, Request};
+use canmaster::motion::{
+    AxisCommand, AxisFeedback, FaultCause, Group, GroupEvent, GroupState, Refusal, Request,
+};
 
 use crate::rig::{AXES, READY, Rig};
 
@@ -479,4 +481,27 @@ fn a_stop_is_coordinated_and_leads_to_standby() {
     assert!(last - first < 10.0, "{stops:?}");
     rig.release();
     assert!(rig.until(Standby, 1500) > 0, "{:?}", rig.events);
+}
+
+/// Cycles in which no step was made have passed all the same.
+#[test]
+fn missed_cycles_count_for_the_time() {
+    let steps = |passed| -> u32 {
+        let mut group = Group::new(&GROUP);
+        let mut commands = [AxisCommand::default(); AXES];
+        let stuck = AxisFeedback {
+            statusword: 0x0240,
+            fresh: true,
+            ..AxisFeedback::default()
+        };
+        let request = Request { passed, ..READY };
+        let mut step = || {
+            group.step(request, &[stuck; AXES], &mut commands);
+            group.state() != FaultStop
+        };
+        (0..100_000).take_while(|_| step()).count() as u32
+    };
+    let each = steps(1);
+    assert!(each > 100, "{each}");
+    assert!(steps(10).abs_diff(each / 10) <= 2, "{}", steps(10));
 }

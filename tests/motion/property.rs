@@ -44,7 +44,7 @@ proptest! {
         let mut out = [AxisCommand::default(); AXES];
         for (feedback, network_ready, stop, fault, absent) in steps {
             let fault = (fault == 0).then_some((2, FaultCause::HeartbeatLost));
-            let request = Request { network_ready, release: false, stop, fault, absent };
+            let request = Request { network_ready, release: false, stop, fault, passed: 1, absent };
             group.step(request, &feedback, &mut out);
             prop_assert!(out.iter().all(|c| c.velocity == 0));
             prop_assert!(out.iter().all(|c| c.acceleration > 0 && c.deceleration > 0));
@@ -80,6 +80,7 @@ fn velocities_follow_releases_only() {
                 release: random.below(40) == 0,
                 stop: random.below(200) == 0,
                 fault: (random.below(600) == 0).then_some((axis, FaultCause::HeartbeatLost)),
+                passed: 1,
                 absent,
             };
             let before = rig.group.state();

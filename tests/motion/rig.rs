@@ -144,5 +144,6 @@ pub(crate) const READY: Request = Request {
     release: false,
     stop: false,
     fault: None,
+    passed: 1,
     absent: 0,
 };
