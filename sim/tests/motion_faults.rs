@@ -223,15 +223,12 @@ fn a_short_circuit_of_the_bus_stops_all_for_good() {
 
 #[test]
 fn cycles_that_do_not_finish_in_time_stop_all() {
-    /// Five cycles at 170 MHz.
-    const LATE_CYCLES: u64 = 1_700_000;
-    const OVERLOADED: Time = Time::from_ms(100);
+    const STUCK: Time = Time::from_ms(20);
     let record = struck(45, None, |world| {
         let irq = irqs::TIM3;
-        let late = |max_cycles| Stimulus::DelayIrq { irq, max_cycles };
-        world.apply(late(LATE_CYCLES));
-        world.run_until(world.now() + OVERLOADED);
-        world.apply(late(0));
+        world.apply(Stimulus::Hang { irq });
+        world.run_until(world.now() + STUCK);
+        world.apply(Stimulus::Resume { irq });
     });
     assert_failed(&record, &["cycles in a row did not finish in time"]);
     // And they are counted.

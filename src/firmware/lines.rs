@@ -59,8 +59,10 @@ impl Sender {
         };
         let pending = can::pending(controller, can::waiting(controller));
         let waits = holds(&pending, CobId::SYNC);
-        let buffers = can::Buffers::of(controller).filter(|_| !waits);
-        if buffers.is_none_or(|to| self.tx.transmit(to, &self.sync).is_err()) {
+        let Some(buffers) = can::Buffers::of(controller) else {
+            return;
+        };
+        if waits || self.tx.transmit(buffers, &self.sync) == can::BUFFERS {
             counters::SYNC_NOT_SENT.add(1);
         }
     }
@@ -258,6 +260,18 @@ fn is_sdo(id: CobId) -> bool {
     )
 }
 
+/// Requests a frame under the ceiling of the SYNC. A function of its own, so that
+/// all registers are free for what happens meanwhile.
+#[inline(never)]
+fn request(
+    sender: &mut impl Mutex<T = Sender>,
+    buffers: can::Buffers,
+    element: can::Element,
+) -> usize {
+    let (element, to) = (element.made(), buffers.made());
+    sender.lock(|sender| sender.tx.transmit(to, &element))
+}
+
 /// Gives the controller of a bus what it has room for.
 #[inline(always)]
 pub(crate) fn refill(
@@ -287,9 +301,8 @@ pub(crate) fn refill(
             let Some(frame) = line.next(bus, &pending, phase) else {
                 break;
             };
-            let (element, to) = (element(&frame).made(), buffers.made());
-            let sent = sender.lock(|sender| sender.tx.transmit(to, &element));
-            if let Some(place) = sent.ok().and_then(|place| pending.get_mut(place)) {
+            let sent = request(sender, buffers, element(&frame));
+            if let Some(place) = pending.get_mut(sent) {
                 *place = frame.id().get();
             } else {
                 // Two frames at most were there, and a SYNC: it cannot come to this.

@@ -85,13 +85,6 @@ fn registers(of: Controller) -> &'static RegisterBlock {
     unsafe { &*(address as *const RegisterBlock) }
 }
 
-/// Why a frame was not accepted for transmission.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TransmitError {
-    /// All three buffers hold frames.
-    Full,
-}
-
 /// The identifier that each buffer was last filled with.
 static IDENTIFIERS: [[AtomicU16; DEPTH]; CONTROLLERS as usize] =
     [const { [const { AtomicU16::new(FREE) }; DEPTH] }; CONTROLLERS as usize];
@@ -141,7 +134,7 @@ impl Buffers {
                 inout(reg) registers,
                 inout(reg) elements,
                 inout(reg) held,
-                options(nomem, nostack, preserves_flags)
+                options(readonly, nostack, preserves_flags)
             );
         }
         Buffers {
@@ -184,19 +177,15 @@ pub fn pending(of: Controller, waiting: u32) -> [u16; BUFFERS] {
 
 impl Tx {
     /// Requests the transmission of `element`. The number of the buffer that it is
-    /// in.
-    ///
-    /// # Errors
-    ///
-    /// [`TransmitError::Full`]: nothing was changed.
+    /// in; [`BUFFERS`]: all hold frames, and nothing was changed.
     #[inline(always)]
-    pub fn transmit(&mut self, by: Buffers, element: &Element) -> Result<usize, TransmitError> {
+    pub fn transmit(&mut self, by: Buffers, element: &Element) -> usize {
         // SAFETY: both were made of references that are valid for ever.
         let (registers, held) = unsafe { (&*by.registers, &*by.held) };
         let status = registers.txfqs().read();
         let index = status.tfqpi().bits() as usize;
         let (false, Some(held)) = (status.tfqf().bit_is_set(), held.get(index)) else {
-            return Err(TransmitError::Full);
+            return BUFFERS;
         };
         held.store(element.identifier(), Relaxed);
         // SAFETY: the clock was switched on by `setup`; the index was checked
@@ -205,7 +194,7 @@ impl Tx {
         unsafe { message_ram::write_tx(by.elements, index, element) };
         // SAFETY: a request bit of a buffer that has just been filled.
         registers.txbar().write(|w| unsafe { w.bits(1 << index) });
-        Ok(index)
+        index
     }
 
     /// Takes back every frame that has not started, so that none goes out late:

@@ -68,11 +68,8 @@ pub(crate) unsafe fn write_tx(first: *mut u32, index: usize, element: &Element) 
     unsafe {
         address.write_volatile(words[0]);
         address.add(1).write_volatile(words[1]);
-        // A frame without data needs no data words: SYNC takes this way.
-        if element.has_data() {
-            address.add(2).write_volatile(words[2]);
-            address.add(3).write_volatile(words[3]);
-        }
+        address.add(2).write_volatile(words[2]);
+        address.add(3).write_volatile(words[3]);
     }
 }
 

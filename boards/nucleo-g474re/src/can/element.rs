@@ -74,10 +74,6 @@ impl Element {
     pub(crate) const fn identifier(&self) -> u16 {
         ((self.0[0] >> STANDARD_SHIFT) & STANDARD_MASK) as u16
     }
-
-    pub(crate) const fn has_data(&self) -> bool {
-        self.0[1] & !EVENT != 0
-    }
 }
 
 /// A received frame.
