@@ -61,6 +61,24 @@ mod app {
     pub(crate) static NETWORK: &Network = &derived::NETWORK;
     pub(crate) static CLOCK: ExtendedClock = ExtendedClock::new();
 
+    static BOARD: Config = {
+        const fn settings(peripheral: u8) -> can::Settings {
+            can::Settings {
+                timing: derived::bit_timing(peripheral),
+                filters: &filters::FILTERS,
+            }
+        }
+        let cycle_us = derived::NETWORK.cycle.as_micros();
+        assert!(cycle_us <= u16::MAX as u32, "no timer counts that far");
+        Config {
+            period_us: cycle_us as u16,
+            deadline_us: derived::TPDO_DEADLINE_US,
+            second_us: derived::WINDOW_US,
+            watchdog_ms: design::WATCHDOG_MS,
+            can: [settings(1), settings(2), settings(3)],
+        }
+    };
+
     #[shared]
     struct Shared {
         od: MasterOd<AXES>,
@@ -133,21 +151,7 @@ mod app {
         event_queue: EventQueue = Queue::new(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
-        let cycle_us = defmt::unwrap!(u16::try_from(NETWORK.cycle.as_micros()).ok());
-        let settings = |peripheral| can::Settings {
-            timing: derived::bit_timing(peripheral),
-            filters: &filters::FILTERS,
-        };
-        let board = nucleo_g474re::setup::<{ derived::CAN }>(
-            cx.device,
-            &Config {
-                period_us: cycle_us,
-                deadline_us: derived::TPDO_DEADLINE_US,
-                second_us: derived::WINDOW_US,
-                watchdog_ms: design::WATCHDOG_MS,
-                can: [settings(1), settings(2), settings(3)],
-            },
-        );
+        let board = nucleo_g474re::setup::<{ derived::CAN }>(cx.device, &BOARD);
 
         let (to_network, from_can) = cx.local.network_queue.split();
         let (answers_to, answers) = cx.local.answer_queue.split();

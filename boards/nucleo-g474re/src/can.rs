@@ -1,5 +1,4 @@
-//! FDCAN1, 2 and 3: the fdcan crate configures them, the way of each frame is
-//! here.
+//! FDCAN1, 2 and 3, with the bit timing and the interrupts of the fdcan crate.
 //!
 //! Not through that crate's own transmit and receive calls: they turn a frame
 //! without data into a remote frame, drop a frame when the buffers are full, and
