@@ -23,7 +23,7 @@ mod app {
     use crate::{
         asking::Asking,
         axes::Axes,
-        configurator::Configurator,
+        configurator::{Configurator, Parts},
         control::Control,
         counters::{self, Counts},
         derived::{self, AXES, BUSES},
@@ -31,7 +31,7 @@ mod app {
         lines::{self, Line, Lines, PRODUCING, SYNCS, Sender},
         log::{News, UPTIME_MS},
         measured::{self, Figure},
-        own_node::{Order, OwnNode, Storage},
+        own_node::{Order, OwnNode},
         reception::{Receiver, States, queue},
         report::{publish, tell},
         roll::{self, Task},
@@ -51,7 +51,7 @@ mod app {
     };
     use core::{mem::MaybeUninit, sync::atomic::Ordering};
     use heapless::spsc::{Consumer, Producer, Queue};
-    use nucleo_g474re::{Config, can, pins, reset_cause::ResetCause, timers, watchdog::Watchdog};
+    use nucleo_g474re::{Config, can, pins, timers, watchdog::Watchdog};
 
     type FrameQueue = Queue<Frame, { design::rx_queue(AXES) }>;
     type NewsQueue = Queue<News, { design::log_queue(AXES) }>;
@@ -96,9 +96,21 @@ mod app {
     #[local]
     struct Local {
         period: timers::Period,
+        producer: ProducerParts,
+        supervisor: Supervisor<AXES>,
+        network: NetworkParts,
+        configurator: Parts,
+    }
+
+    // One resource for each task: its parts are reached from one address.
+
+    struct ProducerParts {
         deadline: timers::Deadline,
         axes: &'static mut Axes,
         events_to: Producer<'static, GroupEvent>,
+    }
+
+    struct NetworkParts {
         tick: timers::Tick,
         microseconds: timers::Microseconds,
         milliseconds: u32,
@@ -110,7 +122,6 @@ mod app {
         from_can: Consumer<'static, Frame>,
         states_to: Producer<'static, Frame>,
         news_to: Producer<'static, News>,
-        supervisor: Supervisor<AXES>,
         heartbeat: nmt::Producer,
         heartbeat_time: Duration,
         orders: Consumer<'static, Order>,
@@ -118,19 +129,6 @@ mod app {
         asking: Asking,
         asleep: u32,
         known_bus: can::ErrorState,
-        reset_cause: ResetCause,
-        clock: timers::Microseconds,
-        boot: &'static mut NetworkBoot<AXES>,
-        answers: Consumer<'static, Frame>,
-        transfer_answers: Consumer<'static, Frame>,
-        states: Consumer<'static, Frame>,
-        news: Consumer<'static, News>,
-        events: Consumer<'static, GroupEvent>,
-        own: &'static mut OwnNode,
-        requests: Consumer<'static, Frame>,
-        orders_to: Producer<'static, Order>,
-        sync_period: timers::SyncPeriod,
-        store: Option<Storage>,
     }
 
     /// Sets up the board and hands each task its part. Runs with interrupts off,
@@ -191,41 +189,47 @@ mod app {
             },
             Local {
                 period: board.period,
-                deadline: board.deadline,
-                axes: new_axes(cx.local.group_place, cx.local.axes_place),
-                events_to,
-                tick: board.tick,
-                microseconds: board.microseconds,
-                milliseconds: 0,
-                run_led: board.run_led,
-                error_led: board.error_led,
-                button: board.button,
-                debounce: Debounce::new(design::BUTTON_SAMPLES),
-                watchdog: board.watchdog,
-                from_can,
-                states_to,
-                news_to,
+                producer: ProducerParts {
+                    deadline: board.deadline,
+                    axes: new_axes(cx.local.group_place, cx.local.axes_place),
+                    events_to,
+                },
                 supervisor: Supervisor::new(NETWORK),
-                heartbeat: nmt::Producer::new(NETWORK.master.node),
-                heartbeat_time: NETWORK.master.heartbeat,
-                orders,
-                counts: Counts::default(),
-                asking: Asking::default(),
-                asleep: 0,
-                known_bus: can::ErrorState::Active,
-                reset_cause: board.reset_cause,
-                clock: board.microseconds,
-                boot,
-                answers,
-                transfer_answers,
-                states,
-                news,
-                events,
-                own,
-                requests,
-                orders_to,
-                sync_period: board.sync_period,
-                store,
+                network: NetworkParts {
+                    tick: board.tick,
+                    microseconds: board.microseconds,
+                    milliseconds: 0,
+                    run_led: board.run_led,
+                    error_led: board.error_led,
+                    button: board.button,
+                    debounce: Debounce::new(design::BUTTON_SAMPLES),
+                    watchdog: board.watchdog,
+                    from_can,
+                    states_to,
+                    news_to,
+                    heartbeat: nmt::Producer::new(NETWORK.master.node),
+                    heartbeat_time: NETWORK.master.heartbeat,
+                    orders,
+                    counts: Counts::default(),
+                    asking: Asking::default(),
+                    asleep: 0,
+                    known_bus: can::ErrorState::Active,
+                },
+                configurator: Parts {
+                    reset_cause: board.reset_cause,
+                    clock: board.microseconds,
+                    boot,
+                    answers,
+                    transfer_answers,
+                    states,
+                    news,
+                    events,
+                    own,
+                    requests,
+                    orders_to,
+                    sync_period: board.sync_period,
+                    store,
+                },
             },
         )
     }
@@ -358,15 +362,16 @@ mod app {
     #[task(
         binds = TIM3,
         priority = 3,
-        local = [deadline, axes, events_to],
+        local = [producer],
         shared = [od, lines, control, commands, &phase]
     )]
     fn pdo_producer(mut cx: pdo_producer::Context) {
         let begun = measured::ticks(*cx.shared.phase);
-        if derived::WINDOW_US != 0 && cx.local.deadline.take_second() {
+        let local = cx.local.producer;
+        if derived::WINDOW_US != 0 && local.deadline.take_second() {
             lines::send_now();
         }
-        let due = cx.local.deadline.take();
+        let due = local.deadline.take();
         if due {
             // Once per period, whatever else pends the task.
             roll::check_in(Task::PdoProducer);
@@ -380,9 +385,9 @@ mod app {
             return;
         };
         let control = cx.shared.control.lock(Control::take);
-        let axes = cx.local.axes;
+        let axes = &mut *local.axes;
         axes.read(&cycle, &mut cx.shared.od);
-        let deadline = cx.local.deadline;
+        let deadline = &mut local.deadline;
         let shared = &mut cx.shared;
         // Their ceiling is the priority of this task: nobody waits for them.
         (&mut shared.control, &mut shared.commands).lock(|shared_control, commands| {
@@ -402,7 +407,7 @@ mod app {
             }
         });
         while let Some(event) = axes.take_event() {
-            if cx.local.events_to.enqueue(event).is_err() {
+            if local.events_to.enqueue(event).is_err() {
                 counters::LOG_FULL.add(1);
             }
             wake::want();
@@ -424,35 +429,35 @@ mod app {
     #[task(
         binds = TIM7,
         priority = 2,
-        local = [
-            tick, microseconds, milliseconds, run_led, error_led, button, debounce, watchdog,
-            from_can, states_to, news_to, supervisor, heartbeat, heartbeat_time,
-            orders, counts, known_bus, asking, asleep,
-        ],
+        local = [network, supervisor],
         shared = [od, lines, control, states, &phase]
     )]
     fn network(mut cx: network::Context) {
-        let local = cx.local;
+        let network::LocalResources {
+            network: local,
+            supervisor,
+            ..
+        } = cx.local;
         let begun = measured::ticks(*cx.shared.phase);
         local.tick.acknowledge();
         let counter = local.microseconds.now();
         CLOCK.keep(counter);
         let now = CLOCK.now(|| counter);
-        *local.milliseconds = local.milliseconds.wrapping_add(1);
-        UPTIME_MS.store(*local.milliseconds, Ordering::Relaxed);
+        local.milliseconds = local.milliseconds.wrapping_add(1);
+        UPTIME_MS.store(local.milliseconds, Ordering::Relaxed);
 
         while let Some(frame) = local.from_can.dequeue() {
             if let Some((FunctionCode::ErrorControl, _)) = frame.id().split() {
-                queue(local.states_to, frame);
+                queue(&mut local.states_to, frame);
                 wake::want();
             }
-            if let Some(report) = local.supervisor.on_frame(&frame, now) {
-                tell(report, local.news_to, &mut cx.shared.control);
+            if let Some(report) = supervisor.on_frame(&frame, now) {
+                tell(report, &mut local.news_to, &mut cx.shared.control);
             }
         }
         if local.milliseconds.is_multiple_of(design::SUPERVISION_MS) {
-            while let Some(report) = local.supervisor.poll(now) {
-                tell(report, local.news_to, &mut cx.shared.control);
+            while let Some(report) = supervisor.poll(now) {
+                tell(report, &mut local.news_to, &mut cx.shared.control);
             }
         }
         let bus = cx.shared.states.lock(|states| worst(states));
@@ -462,24 +467,24 @@ mod app {
             control.bus_off = bus == can::ErrorState::BusOff;
             *control
         });
-        if bus != *local.known_bus {
-            *local.known_bus = bus;
-            publish(local.news_to, News::ErrorState(bus));
+        if bus != local.known_bus {
+            local.known_bus = bus;
+            publish(&mut local.news_to, News::ErrorState(bus));
         }
-        local.supervisor.arm(if control.network_ready {
+        supervisor.arm(if control.network_ready {
             control.operational
         } else {
             0
         });
         while let Some(order) = local.orders.dequeue() {
             match order {
-                Order::Heartbeat(time) => *local.heartbeat_time = time,
-                Order::Consumer(node, time) => local.supervisor.set_consumer_time(node, time),
-                Order::Watch(other) => local.supervisor.watch(other),
+                Order::Heartbeat(time) => local.heartbeat_time = time,
+                Order::Consumer(node, time) => supervisor.set_consumer_time(node, time),
+                Order::Watch(other) => supervisor.watch(other),
             }
         }
-        if control.speaking && local.heartbeat.period() != *local.heartbeat_time {
-            local.heartbeat.set_period(*local.heartbeat_time, now);
+        if control.speaking && local.heartbeat.period() != local.heartbeat_time {
+            local.heartbeat.set_period(local.heartbeat_time, now);
         }
         if let Some(frame) = local.heartbeat.poll(now, control.state())
             && control.speaking
@@ -493,7 +498,7 @@ mod app {
                 .go_on(control.operational, &mut cx.shared.lines);
         }
         if local.milliseconds.is_multiple_of(design::LED_MS) {
-            let lost = local.supervisor.any_lost();
+            let lost = supervisor.any_lost();
             local.run_led.set(leds::run(&control, now));
             local.error_led.set(leds::error(&control, bus, lost, now));
         }
@@ -507,13 +512,13 @@ mod app {
                 .lines
                 .lock(|lines| lines.iter().map(|line| line.planned.overflows()).sum());
             if measured::ON {
-                measured::second(local.asleep, overruns);
-                publish(local.news_to, News::Measured);
+                measured::second(&mut local.asleep, overruns);
+                publish(&mut local.news_to, News::Measured);
             }
             let counts = Counts::now(overruns, wrong_length, overflows);
-            if counts != *local.counts {
-                *local.counts = counts;
-                publish(local.news_to, News::Counts(counts));
+            if counts != local.counts {
+                local.counts = counts;
+                publish(&mut local.news_to, News::Counts(counts));
             }
         }
         wake::if_due(counter);
@@ -533,15 +538,12 @@ mod app {
     /// resets the board.
     #[task(
         priority = 1,
-        local = [
-            reset_cause, clock, boot, answers, transfer_answers, states, news, events, own, requests, orders_to,
-            sync_period, store,
-        ],
+        local = [configurator],
         shared = [od, sender, lines, control, commands]
     )]
     async fn sdo_configurator(cx: sdo_configurator::Context) {
         let mut wake = wake::reader();
-        let mut configurator = Configurator::new(cx.local, cx.shared);
+        let mut configurator = Configurator::new(cx.local.configurator, cx.shared);
         loop {
             configurator.round();
             wake.wait().await;
