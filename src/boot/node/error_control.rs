@@ -8,7 +8,7 @@ use super::state::{
     AwaitBootUp, AwaitErrorControl, AwaitReset, AwaitState, Configure, Lost, Operational, Ready,
     Starting, State,
 };
-use super::{ATTEMPT, NodeBoot, deadline};
+use super::{ATTEMPT, NodeBoot};
 use crate::frame::Frame;
 use crate::nmt::{self, Command, ErrorControl, Guard, Guardian};
 use crate::time::{Duration, Instant};
@@ -23,12 +23,11 @@ impl NodeBoot {
     /// The node reported its NMT state: a boot-up frame, a heartbeat or the
     /// answer to node guarding (CiA 301, 7.2.8.3.2).
     #[inline(never)]
-    pub(in super::super) fn on_error_control(&mut self, frame: &Frame, now: Instant) {
+    pub(in super::super) fn on_error_control(&mut self, frame: &Frame) {
         let Some(ErrorControl { state, .. }) = ErrorControl::decode(frame) else {
             return;
         };
-        self.now = now;
-        let counts = self.guardian.on_frame(frame, now).is_some();
+        let counts = self.guardian.on_frame(frame, self.now).is_some();
         if state == nmt::State::Initialising {
             return self.on_boot_up();
         }
@@ -134,7 +133,7 @@ impl NodeBoot {
     }
 
     /// A lost node is booted again (CiA 302-2, "Error handler").
-    pub(in super::super) fn recover(&mut self, boot_time: Duration, now: Instant) {
+    pub(in super::super) fn recover(&mut self) {
         let booted = match self.state {
             State::Lost(Lost { booted }) => booted,
             // It was put into the list meanwhile.
@@ -143,23 +142,17 @@ impl NodeBoot {
         };
         let may_start = self.is(Assignment::MAY_START);
         if !booted || !may_start {
-            return self.begin(boot_time, may_start, now);
+            return self.begin(may_start);
         }
-        self.now = now;
         self.held = false;
-        self.boot_deadline = deadline(boot_time, now);
+        self.begin_boot_time();
         self.restarted();
     }
 
     /// Sends a reset that was requested, and boots the node again.
-    pub(in super::super) fn reset_by_request(
-        &mut self,
-        command: Command,
-        boot_time: Duration,
-        now: Instant,
-    ) {
+    pub(in super::super) fn reset_by_request(&mut self, command: Command) {
         let was_up = self.is_up();
-        self.begin(boot_time, false, now);
+        self.begin(false);
         if was_up {
             self.lost = true;
             self.report(Event::NodeLost(self.node.id));
@@ -241,8 +234,7 @@ impl NodeBoot {
     }
 
     /// NMT start goes, or went by broadcast, to the node.
-    pub(in super::super) fn start(&mut self, alone: bool, now: Instant) {
-        self.now = now;
+    pub(in super::super) fn start(&mut self, alone: bool) {
         if alone {
             self.send(Command::Start);
         }

@@ -11,7 +11,6 @@ use crate::id::Address;
 use crate::network::{self, ConfigWrite};
 use crate::objects;
 use crate::sdo::{Progress, SdoError};
-use crate::time::Instant;
 
 /// Configuration writes between two progress reports.
 const REPORT_EVERY: u16 = 16;
@@ -32,9 +31,8 @@ const IDENTITY: [(Address, Status); 5] = [
 
 impl NodeBoot {
     /// A frame from the node's SDO server.
-    pub(in super::super) fn on_sdo(&mut self, frame: &Frame, now: Instant) {
-        self.now = now;
-        let progress = self.client.on_frame(frame, now);
+    pub(in super::super) fn on_sdo(&mut self, frame: &Frame) {
+        let progress = self.client.on_frame(frame, self.now);
         self.on_progress(progress);
     }
 
