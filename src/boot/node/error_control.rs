@@ -1,14 +1,14 @@
 //! What error control tells of a node, and what follows (CiA 302-2, "Check node
 //! state", "Start error control service", "Error handler").
 
-use super::super::event::{Action, Event};
+use super::super::event::Action;
 use super::super::failure::{BootResult, Cause, Failure, Status};
 use super::super::settings::Assignment;
 use super::state::{
     AwaitBootUp, AwaitErrorControl, AwaitReset, AwaitState, Configure, Lost, Operational, Ready,
     Starting, State,
 };
-use super::{ATTEMPT, NodeBoot};
+use super::{ATTEMPT, NodeBoot, Step};
 use crate::frame::Frame;
 use crate::nmt::{self, Command, ErrorControl, Guard, Guardian};
 use crate::time::{Duration, Instant};
@@ -40,9 +40,9 @@ impl NodeBoot {
             State::AwaitState(_) if operational => {
                 self.enter(State::Operational(Operational));
                 if core::mem::take(&mut self.lost) {
-                    self.report(Event::NodeBack(self.node.id));
+                    self.tell(Step::Back);
                 }
-                self.done(BootResult::LeftRunning, Event::LeftRunning(self.node.id));
+                self.done(BootResult::LeftRunning, Step::LeftRunning);
             }
             State::AwaitState(_) => self.reset(false),
             State::AwaitErrorControl(_) => self.ready(),
@@ -87,7 +87,7 @@ impl NodeBoot {
         self.client.reset();
         self.tries = 0;
         self.fresh = true;
-        self.report(Event::BootUp(self.node.id));
+        self.tell(Step::BootUp);
         if !self.is(Assignment::MAY_START) {
             return self.await_error_control();
         }
@@ -128,7 +128,7 @@ impl NodeBoot {
         self.lost = true;
         self.result = BootResult::Pending;
         self.enter(State::Lost(Lost { booted }));
-        self.report(Event::NodeLost(self.node.id));
+        self.tell(Step::Lost);
         true
     }
 
@@ -155,7 +155,7 @@ impl NodeBoot {
         self.begin(false);
         if was_up {
             self.lost = true;
-            self.report(Event::NodeLost(self.node.id));
+            self.tell(Step::Lost);
         }
         self.send(command);
     }
@@ -213,24 +213,20 @@ impl NodeBoot {
 
     fn ready(&mut self) {
         self.enter(State::Ready(Ready));
-        self.done(BootResult::Booted, Event::Ready(self.node.id));
+        self.done(BootResult::Booted, Step::Ready);
     }
 
-    fn done(&mut self, result: BootResult, event: Event) {
+    fn done(&mut self, result: BootResult, step: Step) {
         self.gave_up = false;
         self.result = result;
-        self.report(event);
+        self.tell(step);
     }
 
     fn operational(&mut self) {
         self.enter(State::Operational(Operational));
         self.restarts = 0;
         let back = core::mem::take(&mut self.lost);
-        self.report(if back {
-            Event::NodeBack(self.node.id)
-        } else {
-            Event::Operational(self.node.id)
-        });
+        self.tell(if back { Step::Back } else { Step::Operational });
     }
 
     /// NMT start goes, or went by broadcast, to the node.

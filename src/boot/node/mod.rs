@@ -63,6 +63,20 @@ pub(super) struct NodeBoot {
     outbox: Deque<Action, OUTBOX>,
 }
 
+/// A step of which there is no more to tell than whose it is.
+#[derive(Clone, Copy)]
+enum Step {
+    BootUp,
+    Identified,
+    Configured,
+    Ready,
+    LeftRunning,
+    NotListed,
+    Operational,
+    Lost,
+    Back,
+}
+
 /// What the network looks for in its nodes.
 #[derive(Clone, Copy)]
 pub(super) struct Trait(u16);
@@ -243,7 +257,7 @@ impl NodeBoot {
                 status: Status::A,
                 cause: Cause::NotListed,
             });
-            return self.report(Event::NotListed(self.node.id));
+            return self.tell(Step::NotListed);
         }
         let keep_alive = self.is(Assignment::KEEP_ALIVE);
         if reset && !keep_alive {
@@ -337,6 +351,7 @@ impl NodeBoot {
     }
 
     /// A state that time alone does not lead out of.
+    #[inline(never)]
     fn enter(&mut self, state: State) {
         self.enter_until(state, Instant::NEVER);
     }
@@ -378,6 +393,23 @@ impl NodeBoot {
         if !told {
             self.report(Event::Failed(self.node.id, failure));
         }
+    }
+
+    /// Tells of a step that is done.
+    #[inline(never)]
+    fn tell(&mut self, step: Step) {
+        let node = self.node.id;
+        self.report(match step {
+            Step::BootUp => Event::BootUp(node),
+            Step::Identified => Event::Identified(node),
+            Step::Configured => Event::Configured(node),
+            Step::Ready => Event::Ready(node),
+            Step::LeftRunning => Event::LeftRunning(node),
+            Step::NotListed => Event::NotListed(node),
+            Step::Operational => Event::Operational(node),
+            Step::Lost => Event::NodeLost(node),
+            Step::Back => Event::NodeBack(node),
+        });
     }
 
     #[inline(never)]

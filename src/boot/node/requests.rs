@@ -5,7 +5,7 @@ use super::super::event::{Action, Event};
 use super::super::failure::{Cause, Status};
 use super::super::settings::Assignment;
 use super::state::{Configure, Identify, Restore, Retry, State, Verify};
-use super::{ATTEMPT, NodeBoot};
+use super::{ATTEMPT, NodeBoot, Step};
 use crate::frame::Frame;
 use crate::id::Address;
 use crate::network::{self, ConfigWrite};
@@ -57,7 +57,7 @@ impl NodeBoot {
                 }
                 Some((at, _)) => self.read(*at),
                 None => {
-                    self.report(Event::Identified(self.node.id));
+                    self.tell(Step::Identified);
                     if self.is(Assignment::KEEP_ALIVE) && !self.fresh {
                         self.await_state();
                     } else {
@@ -69,7 +69,7 @@ impl NodeBoot {
             State::Verify(Verify { item }) => match SIGNATURE.get(usize::from(item)) {
                 Some(at) => self.read(*at),
                 None => {
-                    self.report(Event::Configured(self.node.id));
+                    self.tell(Step::Configured);
                     self.await_error_control();
                 }
             },
@@ -80,7 +80,7 @@ impl NodeBoot {
             State::Configure(Configure { done }) => match self.planned(done) {
                 Some(write) => self.write(write),
                 None => {
-                    self.report(Event::Configured(self.node.id));
+                    self.tell(Step::Configured);
                     self.await_error_control();
                 }
             },
