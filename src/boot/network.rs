@@ -117,7 +117,7 @@ impl<const N: usize> NetworkBoot<N> {
             ran: false,
             ordered: false,
             searched: false,
-            factory: Factory::new(),
+            factory: Factory::new(network.nodes),
             halted: None,
             pauses: Pauses::new(),
             next: 0,
@@ -201,7 +201,7 @@ impl<const N: usize> NetworkBoot<N> {
         self.set_now(now);
         if frame.id() == CobId::LSS_SLAVE {
             if self.searched
-                && let Some(event) = self.factory.on_frame(frame, self.network.nodes)
+                && let Some(event) = self.factory.on_frame(frame)
             {
                 self.found(event);
             }

@@ -92,7 +92,7 @@ impl<const N: usize> NetworkBoot<N> {
                 .get(place)
                 .is_some_and(|node| node.has(Trait::MISSING))
         };
-        match self.factory.poll(self.now, self.network.nodes, missing) {
+        match self.factory.poll(self.now, missing) {
             Some(Action::Report(event)) => self.found(event),
             Some(action) => self.push(action),
             None => {

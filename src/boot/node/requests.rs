@@ -254,13 +254,6 @@ impl NodeBoot {
 
     /// What an entry of [`IDENTITY`] must be.
     fn expected(&self, item: u8) -> Option<u32> {
-        let identity = &self.node.identity;
-        match item {
-            0 => identity.device_type,
-            1 => identity.vendor,
-            2 => identity.product,
-            3 => identity.revision,
-            _ => identity.serial,
-        }
+        self.node.identity.number(item)
     }
 }
