@@ -14,6 +14,12 @@ pub const HARDWARE_VERSION: &str = "NUCLEO-G474RE";
 /// hung master is silent soon.
 pub const WATCHDOG_MS: u32 = 100;
 
+/// Cycles in a row that may be late, not taken up before the next SYNC or with RPDOs
+/// that did not get out: the next one stops the group. One is no harm, the drives go
+/// on with the commands that they have; after three, as with missing TPDOs, nobody
+/// leads them any more.
+pub const LATE_CYCLES_MAX: u8 = 2;
+
 /// Samples of a millisecond that the button's contact has to keep still.
 /// Contacts of this kind bounce for up to 5 ms.
 pub const BUTTON_SAMPLES: u8 = 20;

@@ -8,9 +8,11 @@ pub const MAX_DATA: usize = 8;
 
 /// A classical CAN data or remote frame with an 11-bit identifier.
 ///
-/// Bytes past `len` are zero, so that equal frames compare equal.
+/// Bytes past `len` are zero, so that equal frames compare equal. Aligned so that it
+/// is copied word by word: it goes through several queues.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(align(4))]
 pub struct Frame {
     id: CobId,
     len: u8,

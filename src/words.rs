@@ -2,7 +2,7 @@
 
 pub(crate) use canmaster_words::{in_words, packed};
 
-/// Texts of ASCII, made by [`packed!`]: a byte below 128 is a letter, any other stands
+/// Texts of ASCII, made by [`packed!`]: a byte of 32..=127 is a letter, any other stands
 /// for the two bytes of a pair.
 pub(crate) struct Packed {
     pub(crate) pairs: &'static [[u8; 2]],
@@ -38,8 +38,9 @@ impl PackedText {
     }
 
     fn unpack(&self, byte: u8, put: &mut dyn FnMut(u8)) {
-        let pair = usize::from(byte).checked_sub(usize::from(FIRST_PAIR));
-        match pair.and_then(|pair| self.pairs.get(pair)) {
+        // Of a letter that is a place behind the last pair.
+        let pair = byte.wrapping_sub(FIRST_PAIR);
+        match self.pairs.get(usize::from(pair)) {
             None => put(byte),
             Some([first, second]) => {
                 self.unpack(*first, put);

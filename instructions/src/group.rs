@@ -78,6 +78,7 @@ fn recorded() -> Vec<Step> {
                 network_ready: at >= NETWORK_UP,
                 fault: (at == FAULT).then_some((0, FaultCause::HeartbeatLost)),
                 absent: 0,
+                passed: 1,
             },
             order: match at {
                 RELEASED | RELEASED_AGAIN => Some(Order::Release),

@@ -222,6 +222,20 @@ fn a_short_circuit_of_the_bus_stops_all_for_good() {
 }
 
 #[test]
+fn cycles_that_do_not_finish_in_time_stop_all() {
+    const STUCK: Time = Time::from_ms(20);
+    let record = struck(45, None, |world| {
+        let irq = irqs::TIM3;
+        world.apply(Stimulus::Hang { irq });
+        world.run_until(world.now() + STUCK);
+        world.apply(Stimulus::Resume { irq });
+    });
+    assert_failed(&record, &["cycles in a row did not finish in time"]);
+    // And they are counted.
+    assert_logged(&record, "so far: 0 SYNC not sent");
+}
+
+#[test]
 fn a_task_that_never_ends_is_found_by_the_watchdog() {
     // Nothing interrupts that of the SYNC.
     spin_in_motion(image(), 42, irqs::TIM2).unwrap_or_else(|error| panic!("{error}"));

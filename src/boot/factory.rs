@@ -8,7 +8,7 @@
 use super::event::{Action, Event};
 use crate::frame::Frame;
 use crate::id::CobId;
-use crate::lss::{Awaited, ConfigurationResult, Fastscan, Mode, Request, Verdict};
+use crate::lss::{Awaited, ConfigurationResult, Fastscan, Mode, Part, Request, Verdict};
 use crate::network::Node;
 use crate::time::{Duration, Instant};
 
@@ -40,6 +40,7 @@ pub(super) struct Factory {
     step: Step,
     /// A request of the step is out, until then; [`Instant::NEVER`]: none is.
     asked: Instant,
+    nodes: &'static [Node],
     scan: Fastscan,
     /// Somebody answered to the question that is out.
     yes: bool,
@@ -50,11 +51,12 @@ pub(super) struct Factory {
 }
 
 impl Factory {
-    pub(super) const fn new() -> Factory {
+    pub(super) const fn new(nodes: &'static [Node]) -> Factory {
         Factory {
             step: Step::Leave,
             asked: Instant::NEVER,
-            scan: Fastscan::new([None; 4]),
+            nodes,
+            scan: Fastscan::new(),
             yes: false,
             place: 0,
             after: Step::Next,
@@ -73,7 +75,7 @@ impl Factory {
     /// Takes in the answer of an LSS slave. Not inlined, here and below: the three
     /// stay small by themselves.
     #[inline(never)]
-    pub(super) fn on_frame(&mut self, frame: &Frame, nodes: &'static [Node]) -> Option<Event> {
+    pub(super) fn on_frame(&mut self, frame: &Frame) -> Option<Event> {
         let awaited = match self.step {
             Step::Scan => Awaited::Identified,
             Step::Give => Awaited::NodeId,
@@ -87,76 +89,72 @@ impl Factory {
             self.yes = true;
             return None;
         }
-        self.settle(Some(result), nodes)
+        self.settle(Some(result))
     }
 
     /// The next thing to do. `wanted` tells which nodes are looked for.
     #[inline(never)]
-    pub(super) fn poll(
-        &mut self,
-        now: Instant,
-        nodes: &'static [Node],
-        wanted: impl Fn(usize) -> bool,
-    ) -> Option<Action> {
+    pub(super) fn poll(&mut self, now: Instant, wanted: impl Fn(usize) -> bool) -> Option<Action> {
         if self.asked != Instant::NEVER {
             if now < self.asked {
                 return None;
             }
-            if let Some(event) = self.settle(None, nodes) {
+            if let Some(event) = self.settle(None) {
                 return Some(Action::Report(event));
             }
         }
         if matches!(self.step, Step::Next) {
-            while self.place < nodes.len() && !wanted(self.place) {
+            while self.place < self.nodes.len() && !wanted(self.place) {
                 self.place += 1;
             }
-            let known = match self.place.checked_sub(nodes.len()) {
-                None | Some(0) => nodes.get(self.place).or(nodes.first()),
-                Some(1) => None,
-                Some(_) => {
-                    self.step = Step::Over;
-                    return None;
-                }
-            };
-            let mut known = known.map_or([None; 4], named);
-            if self.place >= nodes.len() {
-                let [.., serial] = &mut known;
-                *serial = None;
+            if self.place > self.nodes.len() + 1 {
+                self.step = Step::Over;
+                return None;
             }
-            self.scan = Fastscan::new(known);
+            self.scan = Fastscan::new();
             self.step = Step::Scan;
         }
-        let (bytes, time) = match self.step {
-            Step::Leave => (Request::SwitchGlobal(Mode::Waiting).bytes(), Duration::ZERO),
-            Step::Scan => (self.scan.question().bytes(), SCAN_TIMEOUT),
+        let (number, time) = match self.step {
+            Step::Leave => (
+                Request::SwitchGlobal(Mode::Waiting).number(),
+                Duration::ZERO,
+            ),
+            Step::Scan => (self.scan.question().number(), SCAN_TIMEOUT),
             Step::Give => {
-                let node = nodes.get(self.place).map(|node| node.id);
-                (Request::NodeId(node).bytes(), ANSWER_TIMEOUT)
+                let node = self.nodes.get(self.place).map(|node| node.id);
+                (Request::NodeId(node).number(), ANSWER_TIMEOUT)
             }
-            Step::Store => (Request::Store.bytes(), ANSWER_TIMEOUT),
+            Step::Store => (Request::Store.number(), ANSWER_TIMEOUT),
             Step::Next | Step::Over => return None,
         };
         self.asked = now + time;
         self.yes = false;
-        Some(Action::Send(Frame::full(CobId::LSS_MASTER, bytes)))
+        let frame = Frame::full(CobId::LSS_MASTER, number.to_le_bytes());
+        Some(Action::Send(frame))
     }
 
     /// The request that is out has had its time, or its answer.
     #[inline(never)]
-    fn settle(
-        &mut self,
-        result: Option<ConfigurationResult>,
-        nodes: &'static [Node],
-    ) -> Option<Event> {
+    fn settle(&mut self, result: Option<ConfigurationResult>) -> Option<Event> {
         self.asked = Instant::NEVER;
-        let node = nodes.get(self.place).map(|node| node.id);
+        let (nodes, place) = (self.nodes, self.place);
+        let node = nodes.get(place).map(|node| node.id);
+        // Behind the last one: of the same kind as the first, but for the serial
+        // number; then anything.
+        let known = |part: Part| {
+            let like = match nodes.get(place) {
+                None if place == nodes.len() && part != Part::Serial => nodes.first(),
+                node => node,
+            };
+            like?.identity.number(part.position() + 1)
+        };
         let ok = result.is_some_and(ConfigurationResult::is_ok);
         let event = match (self.step, node) {
             (Step::Leave, _) => {
                 self.step = self.after;
                 return None;
             }
-            (Step::Scan, node) => match (self.scan.answer(self.yes), node) {
+            (Step::Scan, node) => match (self.scan.answer(self.yes, known), node) {
                 (Verdict::Continue, _) => return None,
                 (Verdict::Found(_), Some(_)) => {
                     self.step = Step::Give;
@@ -196,15 +194,4 @@ impl Factory {
         self.step = Step::Leave;
         Some(event)
     }
-}
-
-/// The numbers of the LSS address that the network names.
-fn named(node: &Node) -> [Option<u32>; 4] {
-    let identity = &node.identity;
-    [
-        identity.vendor,
-        identity.product,
-        identity.revision,
-        identity.serial,
-    ]
 }

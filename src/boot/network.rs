@@ -4,14 +4,14 @@ use super::bus_off::Pauses;
 use super::event::{Action, Event};
 use super::factory::Factory;
 use super::failure::BootResult;
-use super::node::NodeBoot;
+use super::node::{NodeBoot, Trait};
 use super::phase::Phase;
 use super::settings::{Settings, Startup};
 use crate::frame::Frame;
 use crate::id::{CobId, FunctionCode, NodeId};
 use crate::network::Network;
 use crate::nmt::Command;
-use crate::time::{Duration, Instant};
+use crate::time::Instant;
 use core::mem::MaybeUninit;
 use heapless::{Deque, Vec};
 
@@ -40,8 +40,8 @@ pub struct NetworkBoot<const N: usize> {
     pub(super) searched: bool,
     pub(super) network: &'static Network,
     pub(super) startup: Startup,
-    /// 1F89h; zero: for ever.
-    pub(super) boot_time: Duration,
+    /// The time of what is being done.
+    pub(super) now: Instant,
     /// The end of a phase that time alone leads out of.
     pub(super) until: Instant,
     /// Where the last round over the nodes stopped, so that none starves.
@@ -86,12 +86,13 @@ impl<const N: usize> NetworkBoot<N> {
     }
 
     fn add_nodes(&mut self, settings: &Settings<N>) {
+        let boot_time = settings.boot_time;
         for (place, settings) in settings.nodes.iter().enumerate() {
             if let Some(node) = self.network.nodes.get(place) {
                 // There is room: there are `N` settings.
                 let _ = self
                     .nodes
-                    .push(NodeBoot::new(self.network, node, *settings));
+                    .push(NodeBoot::new(self.network, node, *settings, boot_time));
             }
         }
     }
@@ -104,7 +105,7 @@ impl<const N: usize> NetworkBoot<N> {
         NetworkBoot {
             network,
             startup: settings.startup,
-            boot_time: settings.boot_time,
+            now,
             until: now + network.master.silence,
             nodes: Vec::new(),
             phase: if settings.startup.has(Startup::MASTER) {
@@ -116,7 +117,7 @@ impl<const N: usize> NetworkBoot<N> {
             ran: false,
             ordered: false,
             searched: false,
-            factory: Factory::new(),
+            factory: Factory::new(network.nodes),
             halted: None,
             pauses: Pauses::new(),
             next: 0,
@@ -132,10 +133,10 @@ impl<const N: usize> NetworkBoot<N> {
         if self.phase == Phase::Silent && !self.startup.has(Startup::MASTER) {
             self.phase = Phase::NotMaster;
         }
-        self.boot_time = settings.boot_time;
+        let boot_time = settings.boot_time;
         for (place, settings) in settings.nodes.iter().enumerate() {
             if let Some(node) = self.nodes.get_mut(place) {
-                node.set_settings(*settings);
+                node.set_settings(*settings, boot_time);
             }
         }
     }
@@ -165,12 +166,14 @@ impl<const N: usize> NetworkBoot<N> {
     /// place n in the network.
     pub fn operational(&self) -> u32 {
         let bits = self.nodes.iter().rev();
-        bits.fold(0, |bits, node| bits << 1 | u32::from(node.is_operational()))
+        bits.fold(0, |bits, node| {
+            bits << 1 | u32::from(node.has(Trait::OPERATIONAL))
+        })
     }
 
     /// Whether a node of the list was given up, or not seen in its boot time.
     pub fn any_given_up(&self) -> bool {
-        self.any(|node| node.has_given_up() && node.is(0))
+        self.any(Trait::GIVEN_UP)
     }
 
     /// Whether a mandatory node failed in the start. Nothing leads out but a new
@@ -195,11 +198,12 @@ impl<const N: usize> NetworkBoot<N> {
         if !self.phase.listens() {
             return;
         }
+        self.set_now(now);
         if frame.id() == CobId::LSS_SLAVE {
             if self.searched
-                && let Some(event) = self.factory.on_frame(frame, self.network.nodes)
+                && let Some(event) = self.factory.on_frame(frame)
             {
-                self.found(event, now);
+                self.found(event);
             }
             return;
         }
@@ -210,8 +214,8 @@ impl<const N: usize> NetworkBoot<N> {
             return;
         };
         match function {
-            FunctionCode::SdoResponse => node.on_sdo(frame, now),
-            FunctionCode::ErrorControl => node.on_error_control(frame, now),
+            FunctionCode::SdoResponse => node.on_sdo(frame),
+            FunctionCode::ErrorControl => node.on_error_control(frame),
             _ => {}
         }
     }
@@ -227,11 +231,11 @@ impl<const N: usize> NetworkBoot<N> {
     /// while nobody expected it to be operational: it is reset and booted again.
     /// Some drives leave such an error only by that.
     pub fn node_cut_off(&mut self, id: NodeId, now: Instant) {
-        let boot_time = self.boot_time;
+        self.set_now(now);
         if self.phase.listens()
             && let Some(node) = self.node_mut(id)
         {
-            node.reset_by_request(Command::ResetCommunication, boot_time, now);
+            node.reset_by_request(Command::ResetCommunication);
         }
     }
 
@@ -240,6 +244,7 @@ impl<const N: usize> NetworkBoot<N> {
     /// start was halted or another device is the master.
     #[inline(never)]
     pub fn bus_off(&mut self, now: Instant) {
+        self.set_now(now);
         let pause = self.pauses.next(now);
         self.halted = match self.phase {
             Phase::NotMaster | Phase::Failed | Phase::Stopped => Some(self.phase),
@@ -259,20 +264,21 @@ impl<const N: usize> NetworkBoot<N> {
         if let Some(action) = self.outbox.pop_front() {
             return Some(action);
         }
+        self.set_now(now);
         for _ in 0..self.nodes.len() {
             let index = self.next % self.nodes.len();
-            let action = self.nodes.get_mut(index).and_then(|node| node.poll(now));
+            let action = self.nodes.get_mut(index).and_then(NodeBoot::poll);
             if action.is_some() {
                 return action;
             }
             self.next = index + 1;
         }
         self.next = 0;
-        self.advance(now);
+        self.advance();
         // What the network did may let a node go on.
         self.outbox
             .pop_front()
-            .or_else(|| self.nodes.iter_mut().find_map(|node| node.poll(now)))
+            .or_else(|| self.nodes.iter_mut().find_map(NodeBoot::poll))
     }
 
     /// When [`poll`](Self::poll) has to be called again at the latest.
@@ -291,17 +297,20 @@ impl<const N: usize> NetworkBoot<N> {
         next.deadline()
     }
 
-    /// Whether this is so of any node. Not inlined, here and below: the nodes are
+    /// What follows is done at `now`. Not inlined, here and below: the nodes are
     /// gone through in many places.
     #[inline(never)]
-    pub(super) fn any(&self, is: fn(&NodeBoot) -> bool) -> bool {
-        self.nodes.iter().any(is)
+    pub(super) fn set_now(&mut self, now: Instant) {
+        self.now = now;
+        for node in &mut self.nodes {
+            node.set_now(now);
+        }
     }
 
-    /// Whether this is so of all nodes.
+    /// Whether any node has it.
     #[inline(never)]
-    pub(super) fn all(&self, are: fn(&NodeBoot) -> bool) -> bool {
-        self.nodes.iter().all(are)
+    pub(super) fn any(&self, one: Trait) -> bool {
+        self.nodes.iter().any(|node| node.has(one))
     }
 
     #[inline(never)]

@@ -2,7 +2,7 @@
 
 use super::event::Action;
 use super::network::NetworkBoot;
-use super::node::NodeBoot;
+use super::node::{NodeBoot, Trait};
 use super::phase::Phase;
 use crate::nmt::{Command, NodeControl, Target};
 use crate::time::Instant;
@@ -48,24 +48,24 @@ impl<const N: usize> NetworkBoot<N> {
     #[inline(never)]
     pub fn request(&mut self, control: NodeControl, now: Instant) -> Result<(), Refusal> {
         self.may_request(control)?;
+        self.set_now(now);
         let NodeControl { command, target } = control;
         match target {
             Target::All if is_reset(command) => {
                 self.broadcast(command);
                 self.ran = false;
-                self.begin_all(false, now);
+                self.begin_all(false);
             }
             _ if self.phase == Phase::AwaitingOrder => {
                 self.ordered = true;
-                self.synchronise(now);
+                self.synchronise();
             }
             Target::Node(id) if is_reset(command) => {
-                let boot_time = self.boot_time;
                 if let Some(node) = self.node_mut(id) {
-                    node.reset_by_request(command, boot_time, now);
+                    node.reset_by_request(command);
                 }
             }
-            _ => self.command(control, now),
+            _ => self.command(control),
         }
         Ok(())
     }
@@ -99,7 +99,7 @@ impl<const N: usize> NetworkBoot<N> {
             }
             // A stopped node has no SDO: its boot-up would fail.
             (Phase::Running, Some(_))
-                if to_all && command == Command::Stop && !self.all(NodeBoot::is_settled) =>
+                if to_all && command == Command::Stop && self.any(Trait::UNSETTLED) =>
             {
                 Refusal::Booting
             }
@@ -111,14 +111,14 @@ impl<const N: usize> NetworkBoot<N> {
         })
     }
 
-    fn command(&mut self, control: NodeControl, now: Instant) {
+    fn command(&mut self, control: NodeControl) {
         let NodeControl { command, target } = control;
         let included = |boot: &&mut NodeBoot| target.includes(boot.node().id);
         for node in self.nodes.iter_mut().filter(included) {
             node.hold(command != Command::Start);
             // A node that is started again after that goes the usual way.
-            if command == Command::Start && node.is_startable() {
-                node.start(true, now);
+            if command == Command::Start && !node.has(Trait::NOT_STARTABLE) {
+                node.start(true);
             }
         }
         if command != Command::Start {

@@ -20,22 +20,24 @@ const EVENTS: usize = 4;
 
 /// Values and state behind the entries.
 #[derive(Debug)]
+// In this order, so that what is used most is near: it takes shorter instructions.
+#[repr(C)]
 pub(super) struct Dictionary<const N: usize> {
-    pub(super) description: Description,
-    pub(super) network: &'static Network,
-    pub(super) settings: Settings<N>,
+    pub(super) state: State,
     /// 1F80h, bit 0, as it was when the device started.
     pub(super) is_master: bool,
-    pub(super) errors: emcy::Producer,
-    pub(super) state: State,
-    pub(super) status: u32,
     pub(super) axes_enabled: bool,
-    pub(super) clock: Clock,
-    pub(super) nodes: [NodeRecord; N],
+    pub(super) status: u32,
+    pub(super) network: &'static Network,
+    pub(super) settings: Settings<N>,
     /// 2F12h
     pub(super) transfer: TransferTest,
     pub(super) own_tpdos: OwnTpdos,
     pub(super) events: Deque<Event, EVENTS>,
+    pub(super) errors: emcy::Producer,
+    pub(super) description: Description,
+    pub(super) clock: Clock,
+    pub(super) nodes: [NodeRecord; N],
 }
 
 impl<const N: usize> Dictionary<N> {

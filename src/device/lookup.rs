@@ -14,6 +14,8 @@ use crate::sdo::AbortCode;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Found {
     pub(super) item: Item,
+    /// Of an [`Item::Setting`].
+    pub(super) setting: Setting,
     pub(super) data_type: DataType,
     pub(super) access: Access,
     pub(super) sub: u8,
@@ -27,6 +29,7 @@ pub(super) struct Found {
 impl Found {
     pub(super) const NOTHING: Found = Found {
         item: Item::Zero,
+        setting: Setting::SyncCobId,
         data_type: DataType::Unsigned8,
         access: Access::Constant,
         sub: 0,
@@ -53,6 +56,7 @@ impl<const N: usize> Dictionary<N> {
             };
             *found = Found {
                 item: row.item,
+                setting: Setting::SyncCobId,
                 data_type: row.data_type,
                 access: row.access,
                 sub,
@@ -94,18 +98,16 @@ impl<const N: usize> Dictionary<N> {
         let nodes = nodes::<N>(network);
         let mut last = row.last_sub;
         match found.item {
-            Item::Setting(Setting::ConsumerHeartbeat(_)) => {
-                found.item = Item::Setting(Setting::ConsumerHeartbeat(found.n() as u8));
-            }
-            Item::Setting(Setting::Assignment(_)) => {
-                let place = found.node.and_then(|node| network.find(node));
-                match place {
-                    Some((place, _)) if place < usize::from(nodes) => {
-                        found.item = Item::Setting(Setting::Assignment(place as u8));
-                    }
-                    _ => {
-                        found.item = Item::Zero;
-                        found.access = Access::Constant;
+            Item::Setting => {
+                found.setting = row.setting(found.n() as u8);
+                if let Setting::Assignment(of) = &mut found.setting {
+                    let place = found.node.and_then(|node| network.find(node));
+                    match place {
+                        Some((place, _)) if place < usize::from(nodes) => *of = place as u8,
+                        _ => {
+                            found.item = Item::Zero;
+                            found.access = Access::Constant;
+                        }
                     }
                 }
             }

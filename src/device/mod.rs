@@ -45,7 +45,6 @@ mod view;
 mod window;
 
 pub use error::MasterError;
-pub use node_record::NodeStatus;
 pub use settings::{Setting, Settings};
 pub use transfer::TransferTest;
 

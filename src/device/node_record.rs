@@ -10,8 +10,21 @@ pub(super) const HISTORY: usize = 4;
 
 /// How far the boot-up of a node is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum NodeStatus {
+pub(super) struct NodeStatus {
+    words: Words,
+    /// The error status of CiA 302-2 as an ASCII letter; 0 for none.
+    pub(super) letter: u8,
+    /// Writes done while it is configured.
+    done: u16,
+    /// Writes in all; 0 before the first.
+    total: u16,
+}
+
+/// What is told of a node, by the number of its text. Of a failure without its facts:
+/// those are in the log, whose words take no room in the device.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+enum Words {
     /// The network has not been started yet.
     #[default]
     Idle,
@@ -20,12 +33,9 @@ pub enum NodeStatus {
     /// It is asked what it is.
     Identifying,
     /// Its configuration is being written.
-    Configuring {
-        /// Writes done.
-        done: u16,
-        /// Writes in all; 0 before the first.
-        total: u16,
-    },
+    Configuring,
+    /// It was booted and is not what it should be: it is booted again.
+    Lost,
     /// Its heartbeat is awaited.
     Configured,
     /// It may be started.
@@ -34,110 +44,94 @@ pub enum NodeStatus {
     Operational,
     /// It was operational already and is left so: L.
     LeftRunning,
-    /// It was booted and is not what it should be: it is booted again.
-    Lost,
-    /// It was given up.
-    Failed {
-        /// The letter of CiA 302-2.
-        status: Status,
-        /// The cause without its facts: those are in the log, whose words take no
-        /// room in the device.
-        words: &'static str,
-    },
+    // Given up, and why.
+    NotListed,
+    NoBootUp,
+    Restarts,
+    NoAnswer,
+    Refused,
+    Garbled,
+    Mismatch,
+    NoState,
+    NoHeartbeat,
+    NotOperational,
 }
+
+/// Texts that follow those.
+pub(super) const NOT_IN_THE_NETWORK: u8 = Words::NotOperational as u8 + 1;
+pub(super) const NO_EMERGENCY: u8 = NOT_IN_THE_NETWORK + 1;
+const BOOT_STATUS: u8 = NO_EMERGENCY + 1;
+const WRITES: u8 = BOOT_STATUS + 1;
 
 impl NodeStatus {
     /// The status after a step of the boot-up that concerns this node.
-    pub(super) const fn after(event: &Event) -> Option<NodeStatus> {
-        Some(match *event {
-            Event::ResetSent => NodeStatus::Awaited,
-            Event::BootUp(_) => NodeStatus::Identifying,
-            Event::Identified(_) => NodeStatus::Configuring { done: 0, total: 0 },
-            Event::Configuring { done, total, .. } => NodeStatus::Configuring { done, total },
-            Event::Configured(_) => NodeStatus::Configured,
-            Event::Ready(_) => NodeStatus::Ready,
-            Event::Operational(_) | Event::NodeBack(_) => NodeStatus::Operational,
-            Event::LeftRunning(_) => NodeStatus::LeftRunning,
-            Event::NodeLost(_) => NodeStatus::Lost,
-            Event::NotListed(_) => NodeStatus::Failed {
-                status: Status::A,
-                words: words(&Cause::NotListed),
-            },
-            Event::Failed(_, ref failure) => NodeStatus::Failed {
-                status: failure.status,
-                words: words(&failure.cause),
-            },
+    pub(super) fn after(event: &Event) -> Option<NodeStatus> {
+        let mut status = NodeStatus::default();
+        status.words = match *event {
+            Event::ResetSent => Words::Awaited,
+            Event::BootUp(_) => Words::Identifying,
+            Event::Identified(_) => Words::Configuring,
+            Event::Configuring { done, total, .. } => {
+                (status.done, status.total) = (done, total);
+                Words::Configuring
+            }
+            Event::Configured(_) => Words::Configured,
+            Event::Ready(_) => Words::Ready,
+            Event::Operational(_) | Event::NodeBack(_) => Words::Operational,
+            Event::LeftRunning(_) => {
+                status.letter = Status::L as u8;
+                Words::LeftRunning
+            }
+            Event::NodeLost(_) => Words::Lost,
+            Event::NotListed(_) => {
+                status.letter = Status::A as u8;
+                Words::NotListed
+            }
+            Event::Failed(_, ref failure) => {
+                status.letter = failure.status as u8;
+                words(&failure.cause)
+            }
             _ => return None,
-        })
+        };
+        Some(status)
     }
 
     /// The master speaks to its SDO server, or is about to.
-    pub(super) const fn is_in_boot_up(&self) -> bool {
-        matches!(
-            self,
-            NodeStatus::Awaited
-                | NodeStatus::Identifying
-                | NodeStatus::Configuring { .. }
-                | NodeStatus::Lost
-        )
+    pub(super) fn is_in_boot_up(&self) -> bool {
+        (Words::Awaited..=Words::Lost).contains(&self.words)
     }
 
-    /// The error status of CiA 302-2 as an ASCII letter; 0 for none.
-    pub const fn letter(&self) -> u8 {
-        match self {
-            NodeStatus::Failed { status, .. } => *status as u8,
-            NodeStatus::LeftRunning => Status::L as u8,
-            _ => 0,
-        }
-    }
-}
-
-impl NodeStatus {
     /// In words.
     pub(super) fn write(&self, window: &mut Window<'_>) {
-        window.text(match self {
-            NodeStatus::Idle => "not started yet",
-            NodeStatus::Awaited => "boot-up frame awaited",
-            NodeStatus::Identifying => "identity is checked",
-            NodeStatus::Configuring { .. } => "configuring, ",
-            NodeStatus::Configured => "configured, heartbeat awaited",
-            NodeStatus::Ready => "ready to be started",
-            NodeStatus::Operational => "operational",
-            NodeStatus::LeftRunning => "was operational already and is left running",
-            NodeStatus::Lost => "lost, to be booted again",
-            NodeStatus::Failed { words, .. } => words,
-        });
-        match *self {
-            NodeStatus::Configuring { done, total } => {
-                window.decimal(done);
-                if total != 0 {
-                    window.text(" of ");
-                    window.decimal(total);
-                }
-                window.text(" writes");
+        window.packed(self.words as u8);
+        if self.words == Words::Configuring {
+            window.decimal(self.done);
+            if self.total != 0 {
+                window.text(" of ");
+                window.decimal(self.total);
             }
-            NodeStatus::Failed { status, .. } => {
-                window.text(" (boot status ");
-                window.put(&[status as u8]);
-                window.text(")");
-            }
-            _ => {}
+            window.packed(WRITES);
+        }
+        if self.words >= Words::NotListed {
+            window.packed(BOOT_STATUS);
+            window.put(&[self.letter]);
+            window.text(")");
         }
     }
 }
 
-const fn words(cause: &Cause) -> &'static str {
+const fn words(cause: &Cause) -> Words {
     match cause {
-        Cause::NotListed => "not in the list of this master",
-        Cause::NoBootUp => "no boot-up frame",
-        Cause::Restarts => "restarts again and again",
-        Cause::NoAnswer { .. } => "no answer to an access",
-        Cause::Refused { .. } => "an access was refused",
-        Cause::Garbled { .. } => "wrong answer to an access",
-        Cause::Mismatch { .. } => "not the expected device",
-        Cause::NoState => "does not tell its NMT state",
-        Cause::NoHeartbeat => "no heartbeat after the configuration",
-        Cause::NotOperational => "not operational after NMT start",
+        Cause::NotListed => Words::NotListed,
+        Cause::NoBootUp => Words::NoBootUp,
+        Cause::Restarts => Words::Restarts,
+        Cause::NoAnswer { .. } => Words::NoAnswer,
+        Cause::Refused { .. } => Words::Refused,
+        Cause::Garbled { .. } => Words::Garbled,
+        Cause::Mismatch { .. } => Words::Mismatch,
+        Cause::NoState => Words::NoState,
+        Cause::NoHeartbeat => Words::NoHeartbeat,
+        Cause::NotOperational => Words::NotOperational,
     }
 }
 

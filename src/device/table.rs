@@ -18,9 +18,8 @@ use crate::od::{Access, DataType};
 pub(super) enum Item {
     /// Sub-index 0 of a record or an array.
     Highest,
-    /// What a client may change and 1010h saves. Of the settings of a node, the
-    /// list names the first.
-    Setting(Setting),
+    /// What a client may change and 1010h saves; which one, the row's argument tells.
+    Setting,
     DeviceType,
     ErrorRegister,
     Status,
@@ -68,20 +67,34 @@ pub(super) enum Item {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Row {
     pub(super) first: u16,
-    /// Objects after the first.
-    more: u16,
     pub(super) sub: u8,
     pub(super) last_sub: u8,
     pub(super) data_type: DataType,
     pub(super) access: Access,
     pub(super) item: Item,
+    /// Objects after the first; of settings, which one it is.
+    argument: u8,
 }
 
 impl Row {
     /// The place of an object in this row.
     pub(super) fn place(&self, at: u16) -> Option<u16> {
+        let more = match self.item {
+            Item::Setting => 0,
+            _ => self.argument,
+        };
         at.checked_sub(self.first)
-            .filter(|place| *place <= self.more)
+            .filter(|place| *place <= more.into())
+    }
+
+    /// The setting, with the number of the node that it is of.
+    pub(super) const fn setting(&self, node: u8) -> Setting {
+        Setting::numbered(self.argument, node)
+    }
+
+    /// Whether this is the row of a setting.
+    pub(super) fn is_of(&self, setting: Setting) -> bool {
+        self.item == Item::Setting && self.argument == setting.number()
     }
 
     /// The entries `sub ..= last_sub` of an object.
@@ -94,12 +107,12 @@ impl Row {
     ) -> Row {
         Row {
             first,
-            more: 0,
             sub,
             last_sub,
             data_type,
             access,
             item,
+            argument: 0,
         }
     }
 
@@ -108,8 +121,15 @@ impl Row {
         Row::array(at, (0, 0), data_type, access, item)
     }
 
-    const fn setting(at: u16, data_type: DataType, setting: Setting) -> Row {
-        Row::variable(at, data_type, Access::ReadWrite, Item::Setting(setting))
+    const fn of_setting(self, setting: Setting) -> Row {
+        Row {
+            argument: setting.number(),
+            ..self
+        }
+    }
+
+    const fn variable_setting(at: u16, data_type: DataType, setting: Setting) -> Row {
+        Row::variable(at, data_type, Access::ReadWrite, Item::Setting).of_setting(setting)
     }
 
     /// An array over the nodes, by their places in the network.
@@ -117,10 +137,10 @@ impl Row {
         Row::array(at, (1, EACH_NODE), data_type, access, item)
     }
 
-    /// The same for the objects up to `last`.
+    /// The same for the objects up to `last`, at most 255 more.
     const fn up_to(self, last: u16) -> Row {
         Row {
-            more: last - self.first,
+            argument: (last - self.first) as u8,
             ..self
         }
     }
@@ -135,7 +155,7 @@ const NODES: (u8, u8) = (1, NodeId::MAX.get());
 /// The most objects that the 64 bits of a PDO hold.
 const MAPPED: u8 = 64;
 /// Objects of one kind of PDO parameters.
-const PDOS: u16 = 0x1FF;
+const PDOS: u16 = 0xFF;
 
 pub(super) static TABLE: [Row; 72] = {
     use Access::{Constant, ReadOnly, ReadWrite, WriteOnly};
@@ -179,9 +199,9 @@ pub(super) static TABLE: [Row; 72] = {
             ReadOnly,
             Item::ErrorField,
         ),
-        Row::setting(index::COB_ID_SYNC, Unsigned32, Setting::SyncCobId),
-        Row::setting(index::SYNC_PERIOD, Unsigned32, Setting::SyncPeriod),
-        Row::setting(index::SYNC_WINDOW, Unsigned32, Setting::SyncWindow),
+        Row::variable_setting(index::COB_ID_SYNC, Unsigned32, Setting::SyncCobId),
+        Row::variable_setting(index::SYNC_PERIOD, Unsigned32, Setting::SyncPeriod),
+        Row::variable_setting(index::SYNC_WINDOW, Unsigned32, Setting::SyncWindow),
         Row::variable(
             index::DEVICE_NAME,
             VisibleString,
@@ -215,16 +235,17 @@ pub(super) static TABLE: [Row; 72] = {
             ReadWrite,
             Item::Restore,
         ),
-        Row::setting(index::COB_ID_TIME, Unsigned32, Setting::TimeCobId),
-        Row::setting(index::COB_ID_EMCY, Unsigned32, Setting::EmcyCobId),
-        Row::setting(index::EMCY_INHIBIT, Unsigned16, Setting::EmcyInhibit),
+        Row::variable_setting(index::COB_ID_TIME, Unsigned32, Setting::TimeCobId),
+        Row::variable_setting(index::COB_ID_EMCY, Unsigned32, Setting::EmcyCobId),
+        Row::variable_setting(index::EMCY_INHIBIT, Unsigned16, Setting::EmcyInhibit),
         Row::each_node(
             index::CONSUMER_HEARTBEAT,
             Unsigned32,
             ReadWrite,
-            Item::Setting(Setting::ConsumerHeartbeat(0)),
-        ),
-        Row::setting(
+            Item::Setting,
+        )
+        .of_setting(Setting::ConsumerHeartbeat(0)),
+        Row::variable_setting(
             index::PRODUCER_HEARTBEAT,
             Unsigned16,
             Setting::ProducerHeartbeat,
@@ -236,21 +257,23 @@ pub(super) static TABLE: [Row; 72] = {
             Constant,
             Item::Identity,
         ),
-        Row::setting(index::SYNC_OVERFLOW, Unsigned8, Setting::SyncOverflow),
+        Row::variable_setting(index::SYNC_OVERFLOW, Unsigned8, Setting::SyncOverflow),
         Row::array(
             index::VERIFY_CONFIGURATION,
             (1, 1),
             Unsigned32,
             ReadWrite,
-            Item::Setting(Setting::ConfigurationDate),
-        ),
+            Item::Setting,
+        )
+        .of_setting(Setting::ConfigurationDate),
         Row::array(
             index::VERIFY_CONFIGURATION,
             (2, 2),
             Unsigned32,
             ReadWrite,
-            Item::Setting(Setting::ConfigurationTime),
-        ),
+            Item::Setting,
+        )
+        .of_setting(Setting::ConfigurationTime),
         node(
             index::EMCY_CONSUMER,
             Unsigned32,
@@ -262,8 +285,9 @@ pub(super) static TABLE: [Row; 72] = {
             (1, 1),
             Unsigned8,
             ReadWrite,
-            Item::Setting(Setting::ErrorBehaviour),
-        ),
+            Item::Setting,
+        )
+        .of_setting(Setting::ErrorBehaviour),
         Row::array(
             index::SDO_SERVER,
             (1, 2),
@@ -327,13 +351,14 @@ pub(super) static TABLE: [Row; 72] = {
             Item::ConfiguredAt,
         )
         .up_to(index::EXPECTED_TIME),
-        Row::setting(index::NMT_STARTUP, Unsigned32, Setting::Startup),
+        Row::variable_setting(index::NMT_STARTUP, Unsigned32, Setting::Startup),
         node(
             index::SLAVE_ASSIGNMENT,
             Unsigned32,
             ReadWrite,
-            Item::Setting(Setting::Assignment(0)),
-        ),
+            Item::Setting,
+        )
+        .of_setting(Setting::Assignment(0)),
         node(index::REQUEST_NMT, Unsigned8, ReadWrite, Item::NmtRequest),
         Row::array(
             index::REQUEST_NMT,
@@ -344,7 +369,7 @@ pub(super) static TABLE: [Row; 72] = {
         ),
         node(index::EXPECTED_TYPE, Unsigned32, Constant, Item::Expected)
             .up_to(index::EXPECTED_SERIAL),
-        Row::setting(index::BOOT_TIME, Unsigned32, Setting::BootTime),
+        Row::variable_setting(index::BOOT_TIME, Unsigned32, Setting::BootTime),
         node(
             index::RESTORE_CONFIGURATION,
             Unsigned8,
@@ -370,7 +395,7 @@ pub(super) static TABLE: [Row; 72] = {
         node(index::BOOT_WORDS, VisibleString, ReadOnly, Item::BootWords),
         node(index::EMCY_WORDS, VisibleString, ReadOnly, Item::EmcyWords),
         Row::variable(index::CLOCK, TimeOfDay, ReadWrite, Item::Clock),
-        Row::setting(index::TIME_PERIOD, Unsigned16, Setting::TimePeriod),
+        Row::variable_setting(index::TIME_PERIOD, Unsigned16, Setting::TimePeriod),
         transfer_test((1, 3), ReadWrite),
         transfer_test((4, 4), WriteOnly),
         transfer_test((5, 7), ReadOnly),

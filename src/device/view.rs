@@ -5,6 +5,7 @@ use super::Board;
 use super::Event;
 use super::dictionary::Dictionary;
 use super::lookup::Found;
+use super::node_record::{NO_EMERGENCY, NOT_IN_THE_NETWORK};
 use super::own_tpdo;
 use super::pdo::Mirrored;
 use super::settings::RESTORE_ALL;
@@ -15,7 +16,7 @@ use crate::frame::{Frame, MAX_DATA};
 use crate::id::{Address, CobId, FunctionCode, NodeId};
 use crate::network;
 use crate::nmt::{Command, NodeControl, Target};
-use crate::od::{Access, Chunk, DataType, Entry, ObjectDictionary, Part, Value, read_bytes};
+use crate::od::{Access, Chunk, DataType, Entry, ObjectDictionary, Part, Value};
 use crate::pdo::Direction;
 use crate::sdo::AbortCode;
 use crate::time::Instant;
@@ -57,7 +58,7 @@ impl<'a, B: Board, const N: usize> View<'a, B, N> {
         let record = known.map(|(_, record)| record);
         let number: u32 = match found.item {
             Item::Highest => found.sub.into(),
-            Item::Setting(setting) => dictionary.settings.get(setting),
+            Item::Setting => dictionary.settings.get(found.setting),
             Item::DeviceType => dictionary.description.device_type,
             Item::ErrorRegister => dictionary.errors.register().0.into(),
             Item::Status => dictionary.status,
@@ -129,7 +130,7 @@ impl<'a, B: Board, const N: usize> View<'a, B, N> {
                 .copied()
                 .unwrap_or(0),
             Item::RestoreConfiguration => known.map_or(0, |_| RESTORE_ALL).into(),
-            Item::BootLetter => record.map_or(0, |record| record.status.letter()).into(),
+            Item::BootLetter => record.map_or(0, |record| record.status.letter).into(),
             Item::EmcyCount => record.map_or(0, |record| record.emcy.len() as u32),
             Item::EmcyHistory => {
                 let emcy = record.and_then(|record| record.emcy.get(found.n()));
@@ -229,7 +230,7 @@ impl<B: Board, const N: usize> ObjectDictionary for View<'_, B, N> {
         let node = found.node;
         let target = node.map_or(Target::All, Target::Node);
         match found.item {
-            Item::Setting(setting) => return dictionary.change(setting, number),
+            Item::Setting => return dictionary.change(found.setting, number),
             // Only 0 can be written, which clears the field.
             Item::ErrorCount | Item::EmcyCount if number != 0 => {
                 return Err(AbortCode::VALUE_RANGE);
@@ -273,40 +274,35 @@ impl<B: Board, const N: usize> ObjectDictionary for View<'_, B, N> {
         dictionary.find(at, &mut found)?;
         let known = found.node.and_then(|id| dictionary.node(id));
         let description = &dictionary.description;
-        let text = match found.item {
-            Item::DeviceName => description.name,
-            Item::HardwareVersion => description.hardware,
-            Item::SoftwareVersion => description.software,
-            Item::ConciseDcf | Item::BootWords | Item::EmcyWords => {
-                let mut window = Window::new(offset, buf);
-                match (found.item, known) {
-                    (Item::ConciseDcf, Some((node, _))) => {
-                        let network = dictionary.network;
-                        concise_dcf(|| network::plan(network, node), &mut window);
-                    }
-                    (Item::ConciseDcf, None) => return Err(AbortCode::NO_DATA),
-                    (_, None) => window.text("not in the network"),
-                    (Item::BootWords, Some((node, record))) => {
-                        window.text(node.name);
-                        window.text(": ");
-                        record.status.write(&mut window);
-                    }
-                    (_, Some((_, record))) => match record.emcy.get(0) {
-                        Some(emcy) => {
-                            window.hexadecimal(emcy.code.0);
-                            window.text("h (");
-                            window.packed(&emcy.code.packed_text());
-                            window.text(")");
-                        }
-                        None => window.text("no emergency"),
-                    },
-                }
-                return Ok(window.chunk());
+        let window = &mut Window::new(offset, buf);
+        match (found.item, known) {
+            (Item::DeviceName, _) => window.text(description.name),
+            (Item::HardwareVersion, _) => window.text(description.hardware),
+            (Item::SoftwareVersion, _) => window.text(description.software),
+            (Item::ConciseDcf, Some((node, _))) => {
+                let network = dictionary.network;
+                concise_dcf(|| network::plan(network, node), window);
             }
-            Item::Board => return self.board.read(at, offset, buf),
+            (Item::ConciseDcf, None) => return Err(AbortCode::NO_DATA),
+            (Item::BootWords | Item::EmcyWords, None) => window.packed(NOT_IN_THE_NETWORK),
+            (Item::BootWords, Some((node, record))) => {
+                window.text(node.name);
+                window.text(": ");
+                record.status.write(window);
+            }
+            (Item::EmcyWords, Some((_, record))) => match record.emcy.get(0) {
+                Some(emcy) => {
+                    window.hexadecimal(emcy.code.0);
+                    window.text("h (");
+                    window.spell(&emcy.code.packed_text());
+                    window.text(")");
+                }
+                None => window.packed(NO_EMERGENCY),
+            },
+            (Item::Board, _) => return self.board.read(at, offset, buf),
             _ => return Err(AbortCode::UNSUPPORTED_ACCESS),
-        };
-        Ok(read_bytes(text.as_bytes(), offset, buf))
+        }
+        Ok(window.chunk())
     }
 
     /// Of the entries without a fixed size only the board's can be written.

@@ -1,5 +1,6 @@
 //! Reading a piece of something that is made anew each time.
 
+use crate::emcy;
 use crate::network::ConfigWrite;
 use crate::od::Chunk;
 use crate::words::PackedText;
@@ -36,7 +37,12 @@ impl Window<'_> {
         self.put(text.as_bytes());
     }
 
-    pub(super) fn packed(&mut self, text: &PackedText) {
+    /// A text by its number.
+    pub(super) fn packed(&mut self, number: u8) {
+        self.spell(&emcy::other_text(number));
+    }
+
+    pub(super) fn spell(&mut self, text: &PackedText) {
         text.spell(&mut |letter| self.put(&[letter]));
     }
 
@@ -81,6 +87,9 @@ impl Window<'_> {
     }
 }
 
+/// Index, sub-index and size of an entry of a concise DCF.
+const ENTRY: usize = 7;
+
 /// A concise DCF (CiA 302-3): the number of entries, then each with its index,
 /// sub-index, size and data.
 pub(super) fn concise_dcf<I: Iterator<Item = ConfigWrite>>(
@@ -90,10 +99,11 @@ pub(super) fn concise_dcf<I: Iterator<Item = ConfigWrite>>(
     let count = u32::try_from(writes().count()).unwrap_or(u32::MAX);
     window.put(&count.to_le_bytes());
     for write in writes() {
-        window.put(&write.at.index.0.to_le_bytes());
-        window.put(&[write.at.sub.0]);
-        window.put(&(write.len() as u32).to_le_bytes());
-        let bytes = write.bytes();
-        window.put(bytes.get(..write.len()).unwrap_or(&bytes));
+        let [low, high] = write.at.index.0.to_le_bytes();
+        let len = write.len();
+        let [a, b, c, d] = write.bytes();
+        // Sizes are below 256.
+        let entry = [low, high, write.at.sub.0, len as u8, 0, 0, 0, a, b, c, d];
+        window.put(entry.get(..ENTRY + len).unwrap_or(&entry));
     }
 }

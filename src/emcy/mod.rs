@@ -12,6 +12,7 @@ pub use code::{Class, EmcyCode};
 pub use history::History;
 pub use producer::{ERROR_FIELD, Producer};
 pub use register::ErrorRegister;
+pub(crate) use texts::other as other_text;
 
 use crate::frame::{Frame, MAX_DATA};
 use crate::id::{CobId, FunctionCode, NodeId};

@@ -1,4 +1,5 @@
-//! The words of the emergency error codes.
+//! The words of the emergency error codes; and, because texts that are packed together
+//! take less, all others that the object dictionary has for people.
 
 use super::EmcyCode;
 use crate::words::{Packed, PackedText, in_words, packed};
@@ -22,7 +23,32 @@ macro_rules! texts {
 
         const RANGES: &[(u16, u16)] = &[$(($first, $last)),*];
 
-        packed!(WORDS: $($text,)* "unknown error, treated as a fault");
+        packed!(
+            WORDS: $($text,)* "unknown error, treated as a fault",
+            "not started yet",
+            "boot-up frame awaited",
+            "identity is checked",
+            "configuring, ",
+            "lost, to be booted again",
+            "configured, heartbeat awaited",
+            "ready to be started",
+            "operational",
+            "was operational already and is left running",
+            "not in the list of this master",
+            "no boot-up frame",
+            "restarts again and again",
+            "no answer to an access",
+            "an access was refused",
+            "wrong answer to an access",
+            "not the expected device",
+            "does not tell its NMT state",
+            "no heartbeat after the configuration",
+            "not operational after NMT start",
+            "not in the network",
+            "no emergency",
+            " (boot status ",
+            " writes"
+        );
     };
 }
 
@@ -122,95 +148,72 @@ impl Meaning {
     /// In the order of the texts.
     #[cfg(feature = "defmt")]
     fn place(&self) -> u8 {
-        find(self.0).0
+        find(self.0)
     }
 }
 
 /// The words of a code, or that nobody knows it, packed.
 pub(super) fn packed_of(code: EmcyCode) -> PackedText {
-    let (place, start) = find(code);
-    let entry = ENTRIES.get(usize::from(place));
-    let len = entry.map_or(UNKNOWN, |entry| entry.bytes);
-    WORDS.text(start, usize::from(len))
+    text(find(code))
 }
 
-/// The place of a code's line, or the one behind the last, and where its packed words
-/// begin.
-fn find(code: EmcyCode) -> (u8, usize) {
-    let (mut place, mut start) = (0, 0);
-    for entry in &ENTRIES {
-        if entry.contains(code.0) {
+/// The text with this number of those that are not of emergencies.
+pub(crate) fn other(number: u8) -> PackedText {
+    text(OTHERS + number)
+}
+
+/// The first text behind those of the codes and of unknown ones.
+const OTHERS: u8 = RANGES.len() as u8 + 1;
+
+/// The place of a code's line, or the one behind the last.
+#[inline(never)]
+fn find(code: EmcyCode) -> u8 {
+    let mut place = 0;
+    for (first, span) in FIRSTS.iter().zip(&CODES) {
+        let span = SPANS.get(usize::from(*span)).copied().unwrap_or(0);
+        if code.0.wrapping_sub(*first) <= span {
             break;
         }
         place += 1;
-        start += usize::from(entry.bytes);
     }
-    (place, start)
+    place
 }
 
-/// A line in four bytes.
-#[derive(Clone, Copy)]
-struct Entry {
-    first: u16,
-    /// How many codes follow the first one, by its place in [`SPANS`].
-    span: u8,
-    /// How many bytes the packed words have. They begin where those of the line before
-    /// end.
-    bytes: u8,
+/// The text with this number: it begins where those before it end.
+#[inline(never)]
+fn text(number: u8) -> PackedText {
+    let (mut start, mut len) = (0, 0);
+    for next in WORDS.lengths.iter().take(usize::from(number) + 1) {
+        start += len;
+        len = usize::from(*next);
+    }
+    WORDS.text(start, len)
 }
 
-/// How many codes follow the first one of an entry.
+/// How many codes follow the first one of a line.
 const SPANS: [u16; 8] = [0x000, 0x002, 0x003, 0x008, 0x013, 0x070, 0x0FF, 0xFFF];
 
-impl Entry {
-    const NONE: Entry = Entry {
-        first: 0,
-        span: 0,
-        bytes: 0,
-    };
+/// The first code of each line.
+static FIRSTS: [u16; RANGES.len()] = lines().0;
+/// How many follow it, by the place in [`SPANS`].
+static CODES: [u8; RANGES.len()] = lines().1;
 
-    /// # Panics
-    /// While it is compiled, if there is no such span.
-    const fn new((first, last): (u16, u16), bytes: u8) -> Entry {
-        let mut spans: &[u16] = &SPANS;
-        while let [others @ .., span] = spans {
-            if last - first == *span {
-                return Entry {
-                    first,
-                    span: others.len() as u8,
-                    bytes,
-                };
-            }
-            assert!(!others.is_empty(), "a span that is not in the list");
-            spans = others;
-        }
-        Entry::NONE
-    }
-
-    fn contains(&self, code: u16) -> bool {
-        let span = SPANS.get(usize::from(self.span)).copied().unwrap_or(0);
-        code.wrapping_sub(self.first) <= span
-    }
-}
-
-static ENTRIES: [Entry; RANGES.len()] = entries();
-
+/// # Panics
+/// While it is compiled, if there is a span that is not in the list.
 #[expect(clippy::indexing_slicing, reason = "evaluated by the compiler only")]
-const fn entries() -> [Entry; RANGES.len()] {
-    let mut entries = [Entry::NONE; RANGES.len()];
+const fn lines() -> ([u16; RANGES.len()], [u8; RANGES.len()]) {
+    let (mut firsts, mut codes) = ([0; RANGES.len()], [0; RANGES.len()]);
     let mut n = 0;
     while n < RANGES.len() {
-        entries[n] = Entry::new(RANGES[n], WORDS.lengths[n]);
+        let (first, last) = RANGES[n];
+        firsts[n] = first;
+        while SPANS[codes[n] as usize] != last - first {
+            codes[n] += 1;
+        }
         n += 1;
     }
-    entries
+    (firsts, codes)
 }
-
-/// Bytes of the last words.
-const UNKNOWN: u8 = match WORDS.lengths {
-    [.., last] => *last,
-    [] => 0,
-};
 
 #[cfg(test)]
 mod tests {
@@ -231,7 +234,7 @@ mod tests {
     fn no_entry_hides_a_later_one() {
         for (n, (first, last)) in RANGES.iter().enumerate() {
             let mut codes = (*first..=*last).map(EmcyCode);
-            let seen = codes.any(|code| usize::from(find(code).0) == n);
+            let seen = codes.any(|code| usize::from(find(code)) == n);
             assert!(seen, "{first:04X}h");
         }
     }

@@ -23,7 +23,7 @@ mod app {
     use crate::{
         asking::Asking,
         axes::Axes,
-        configurator::Configurator,
+        configurator::{Configurator, Parts},
         control::Control,
         counters::{self, Counts},
         derived::{self, AXES, BUSES},
@@ -31,7 +31,7 @@ mod app {
         lines::{self, Line, Lines, PRODUCING, SYNCS, Sender},
         log::{News, UPTIME_MS},
         measured::{self, Figure},
-        own_node::{Order, OwnNode, Storage},
+        own_node::{Order, OwnNode},
         reception::{Receiver, States, queue},
         report::{publish, tell},
         roll::{self, Task},
@@ -54,7 +54,7 @@ mod app {
     };
     use core::{mem::MaybeUninit, sync::atomic::Ordering};
     use heapless::spsc::{Consumer, Producer, Queue};
-    use nucleo_g474re::{Config, can, pins, reset_cause::ResetCause, timers, watchdog::Watchdog};
+    use nucleo_g474re::{Config, can, pins, timers, watchdog::Watchdog};
 
     type FrameQueue = Queue<Frame, { design::rx_queue(AXES) }>;
     type NewsQueue = Queue<News, { design::log_queue(AXES) }>;
@@ -63,6 +63,24 @@ mod app {
 
     pub(crate) static NETWORK: &Network = &derived::NETWORK;
     pub(crate) static CLOCK: ExtendedClock = ExtendedClock::new();
+
+    static BOARD: Config = {
+        const fn settings(peripheral: u8) -> can::Settings {
+            can::Settings {
+                timing: derived::bit_timing(peripheral),
+                filters: &filters::FILTERS,
+            }
+        }
+        let cycle_us = derived::NETWORK.cycle.as_micros();
+        assert!(cycle_us <= u16::MAX as u32, "no timer counts that far");
+        Config {
+            period_us: cycle_us as u16,
+            deadline_us: derived::TPDO_DEADLINE_US,
+            second_us: derived::WINDOW_US,
+            watchdog_ms: design::WATCHDOG_MS,
+            can: [settings(1), settings(2), settings(3)],
+        }
+    };
 
     #[shared]
     struct Shared {
@@ -82,10 +100,20 @@ mod app {
     #[local]
     struct Local {
         period: timers::Period,
+        producer: ProducerParts,
+        supervisor: Supervisor<AXES>,
+        network: NetworkParts,
+        configurator: Parts,
+    }
+
+    // One resource for each task: its parts are reached from one address.
+
+    struct ProducerParts {
         deadline: timers::Deadline,
-        director: &'static mut Director<AXES>,
-        panel: &'static mut Panel<AXES>,
         events_to: Producer<'static, GroupEvent>,
+    }
+
+    struct NetworkParts {
         tick: timers::Tick,
         microseconds: timers::Microseconds,
         milliseconds: u32,
@@ -97,7 +125,6 @@ mod app {
         from_can: Consumer<'static, Frame>,
         states_to: Producer<'static, Frame>,
         news_to: Producer<'static, News>,
-        supervisor: Supervisor<AXES>,
         heartbeat: nmt::Producer,
         heartbeat_time: Duration,
         orders: Consumer<'static, Order>,
@@ -105,19 +132,6 @@ mod app {
         asking: Asking,
         asleep: u32,
         known_bus: can::ErrorState,
-        reset_cause: ResetCause,
-        clock: timers::Microseconds,
-        boot: &'static mut NetworkBoot<AXES>,
-        answers: Consumer<'static, Frame>,
-        transfer_answers: Consumer<'static, Frame>,
-        states: Consumer<'static, Frame>,
-        news: Consumer<'static, News>,
-        events: Consumer<'static, GroupEvent>,
-        own: &'static mut OwnNode,
-        requests: Consumer<'static, Frame>,
-        orders_to: Producer<'static, Order>,
-        sync_period: timers::SyncPeriod,
-        store: Option<Storage>,
     }
 
     /// Sets up the board and hands each task its part. Runs with interrupts off,
@@ -141,21 +155,7 @@ mod app {
         event_queue: EventQueue = Queue::new(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
-        let cycle_us = defmt::unwrap!(u16::try_from(NETWORK.cycle.as_micros()).ok());
-        let settings = |peripheral| can::Settings {
-            timing: derived::bit_timing(peripheral),
-            filters: &filters::FILTERS,
-        };
-        let board = nucleo_g474re::setup::<{ derived::CAN }>(
-            cx.device,
-            &Config {
-                period_us: cycle_us,
-                deadline_us: derived::TPDO_DEADLINE_US,
-                second_us: derived::WINDOW_US,
-                watchdog_ms: design::WATCHDOG_MS,
-                can: [settings(1), settings(2), settings(3)],
-            },
-        );
+        let board = nucleo_g474re::setup::<{ derived::CAN }>(cx.device, &BOARD);
 
         let (to_network, from_can) = cx.local.network_queue.split();
         let (answers_to, answers) = cx.local.answer_queue.split();
@@ -196,42 +196,48 @@ mod app {
             },
             Local {
                 period: board.period,
-                deadline: board.deadline,
-                director: configured(cx.local.planning),
-                panel: new_panel(cx.local.panel_place, cx.local.program),
-                events_to,
-                tick: board.tick,
-                microseconds: board.microseconds,
-                milliseconds: 0,
-                run_led: board.run_led,
-                error_led: board.error_led,
-                button: board.button,
-                debounce: Debounce::new(design::BUTTON_SAMPLES),
-                watchdog: board.watchdog,
-                from_can,
-                states_to,
-                news_to,
+                producer: ProducerParts {
+                    deadline: board.deadline,
+                    events_to,
+                },
                 supervisor: Supervisor::new(NETWORK),
-                heartbeat: nmt::Producer::new(NETWORK.master.node),
-                heartbeat_time: NETWORK.master.heartbeat,
-                orders,
-                counts: Counts::default(),
-                asking: Asking::default(),
-                asleep: 0,
-                known_bus: can::ErrorState::Active,
-                reset_cause: board.reset_cause,
-                clock: board.microseconds,
-                boot,
-                answers,
-                transfer_answers,
-                states,
-                news,
-                events,
-                own,
-                requests,
-                orders_to,
-                sync_period: board.sync_period,
-                store,
+                network: NetworkParts {
+                    tick: board.tick,
+                    microseconds: board.microseconds,
+                    milliseconds: 0,
+                    run_led: board.run_led,
+                    error_led: board.error_led,
+                    button: board.button,
+                    debounce: Debounce::new(design::BUTTON_SAMPLES),
+                    watchdog: board.watchdog,
+                    from_can,
+                    states_to,
+                    news_to,
+                    heartbeat: nmt::Producer::new(NETWORK.master.node),
+                    heartbeat_time: NETWORK.master.heartbeat,
+                    orders,
+                    counts: Counts::default(),
+                    asking: Asking::default(),
+                    asleep: 0,
+                    known_bus: can::ErrorState::Active,
+                },
+                configurator: Parts {
+                    reset_cause: board.reset_cause,
+                    clock: board.microseconds,
+                    boot,
+                    director: configured(cx.local.planning),
+                    panel: new_panel(cx.local.panel_place, cx.local.program),
+                    answers,
+                    transfer_answers,
+                    states,
+                    news,
+                    events,
+                    own,
+                    requests,
+                    orders_to,
+                    sync_period: board.sync_period,
+                    store,
+                },
             },
         )
     }
@@ -277,12 +283,20 @@ mod app {
     /// Sleeps until the next interrupt.
     #[idle(shared = [&clock_us])]
     fn idle(cx: idle::Context) -> ! {
+        if !measured::ON {
+            loop {
+                cortex_m::asm::wfi();
+            }
+        }
+        let mut asleep: u32 = 0;
         loop {
             // What wakes it runs when the time is taken.
             cortex_m::interrupt::free(|_| {
                 let since = cx.shared.clock_us.now();
                 cortex_m::asm::wfi();
-                measured::slept(cx.shared.clock_us.now().wrapping_sub(since));
+                let slept = cx.shared.clock_us.now().wrapping_sub(since);
+                asleep = asleep.wrapping_add(slept);
+                measured::slept(asleep);
             });
         }
     }
@@ -304,7 +318,7 @@ mod app {
         // What may go after the SYNC.
         lines::send_now();
         roll::check_in(Task::SyncTick);
-        measured::give(Figure::SyncTick, cx.shared.phase.ticks());
+        measured::give(Figure::SyncTick, measured::ticks(*cx.shared.phase));
     }
 
     /// Refills the transmit buffers and empties the receive FIFOs.
@@ -364,20 +378,22 @@ mod app {
     /// Trigger: pended by the last expected TPDO, or TIM3 compare at the
     /// deadline, whichever is first; once per cycle. Budget: 30 000 cycles. If it
     /// has not run before the next SYNC, that cycle is an overrun: it is counted,
-    /// and the drives keep the set-points of the cycle before.
+    /// and the drives keep the set-points of the cycle before. Several in a row stop
+    /// the group (`design::LATE_CYCLES_MAX`).
     #[task(
         binds = TIM3,
         priority = 3,
-        local = [deadline, events_to],
+        local = [producer],
         shared = [od, lines, control, commands, axes, &phase]
     )]
     fn pdo_producer(mut cx: pdo_producer::Context) {
-        let begun = cx.shared.phase.ticks();
-        if derived::WINDOW_US != 0 && cx.local.deadline.take_second() {
+        let begun = measured::ticks(*cx.shared.phase);
+        let local = cx.local.producer;
+        if derived::WINDOW_US != 0 && local.deadline.take_second() {
             lines::send_now();
         }
-        let deadline = cx.local.deadline.take();
-        if deadline {
+        let due = local.deadline.take();
+        if due {
             // Once per period, whatever else pends the task.
             roll::check_in(Task::PdoProducer);
         }
@@ -385,28 +401,31 @@ mod app {
         let producing = PRODUCING.load(Ordering::Relaxed);
         let Some(cycle) = cx.shared.od.lock(|od| {
             od.follow(syncs);
-            od.take_cycle(producing, deadline)
+            od.take_cycle(producing, due)
         }) else {
             return;
         };
         let control = cx.shared.control.lock(Control::take);
-        let events_to = cx.local.events_to;
-        let phase = cx.shared.phase;
-        cx.shared.axes.lock(|axes| {
-            axes.read(&cycle, &mut cx.shared.od);
-            axes.step(&control);
-            let enabled = axes.enabled(&control);
-            (&mut cx.shared.control, &mut cx.shared.commands).lock(|control, commands| {
-                control.axes_enabled = enabled;
-                *commands = *axes.commands();
-            });
-            if cx.local.deadline.elapsed_us() > control.latest_us {
+        let deadline = &mut local.deadline;
+        let events_to = &mut local.events_to;
+        let shared = &mut cx.shared;
+        // Their ceiling is the priority of this task: nobody waits for them.
+        let theirs = (&mut shared.control, &mut shared.commands, &mut shared.axes);
+        theirs.lock(|shared_control, commands, axes| {
+            axes.read(&cycle, &mut shared.od);
+            axes.step(&cycle, &control, commands);
+            shared_control.axes_enabled = axes.enabled(&control);
+            if deadline.elapsed_us() > control.latest_us {
                 // What comes after the window of the SYNC is not sent any more.
                 counters::RPDO_REPLACED.add(1);
+                axes.skip();
             } else if control.leads() && !control.bus_off {
-                axes.write(&cycle, &mut cx.shared.lines);
-                lines::send_now();
-                measured::give(Figure::Cycle, phase.elapsed_us());
+                if axes.write(&cycle, commands, &mut shared.lines) {
+                    lines::send_now();
+                }
+                if measured::ON {
+                    measured::give(Figure::Cycle, shared.phase.elapsed_us());
+                }
             }
             while let Some(event) = axes.take_event() {
                 if events_to.enqueue(event).is_err() {
@@ -418,7 +437,7 @@ mod app {
                 wake::want();
             }
         });
-        measured::give(Figure::PdoProducer, phase.ticks_since(begun));
+        measured::ran(Figure::PdoProducer, *cx.shared.phase, begun);
     }
 
     /// The worst of the controllers' states.
@@ -435,35 +454,35 @@ mod app {
     #[task(
         binds = TIM7,
         priority = 2,
-        local = [
-            tick, microseconds, milliseconds, run_led, error_led, button, debounce, watchdog,
-            from_can, states_to, news_to, supervisor, heartbeat, heartbeat_time,
-            orders, counts, known_bus, asking, asleep,
-        ],
+        local = [network, supervisor],
         shared = [od, lines, control, states, &phase]
     )]
     fn network(mut cx: network::Context) {
-        let local = cx.local;
-        let begun = cx.shared.phase.ticks();
+        let network::LocalResources {
+            network: local,
+            supervisor,
+            ..
+        } = cx.local;
+        let begun = measured::ticks(*cx.shared.phase);
         local.tick.acknowledge();
         let counter = local.microseconds.now();
         CLOCK.keep(counter);
         let now = CLOCK.now(|| counter);
-        *local.milliseconds = local.milliseconds.wrapping_add(1);
-        UPTIME_MS.store(*local.milliseconds, Ordering::Relaxed);
+        local.milliseconds = local.milliseconds.wrapping_add(1);
+        UPTIME_MS.store(local.milliseconds, Ordering::Relaxed);
 
         while let Some(frame) = local.from_can.dequeue() {
             if let Some((FunctionCode::ErrorControl, _)) = frame.id().split() {
-                queue(local.states_to, frame);
+                queue(&mut local.states_to, frame);
                 wake::want();
             }
-            if let Some(report) = local.supervisor.on_frame(&frame, now) {
-                tell(report, local.news_to, &mut cx.shared.control);
+            if let Some(report) = supervisor.on_frame(&frame, now) {
+                tell(report, &mut local.news_to, &mut cx.shared.control);
             }
         }
         if local.milliseconds.is_multiple_of(design::SUPERVISION_MS) {
-            while let Some(report) = local.supervisor.poll(now) {
-                tell(report, local.news_to, &mut cx.shared.control);
+            while let Some(report) = supervisor.poll(now) {
+                tell(report, &mut local.news_to, &mut cx.shared.control);
             }
         }
         let bus = cx.shared.states.lock(|states| worst(states));
@@ -473,24 +492,24 @@ mod app {
             control.bus_off = bus == can::ErrorState::BusOff;
             *control
         });
-        if bus != *local.known_bus {
-            *local.known_bus = bus;
-            publish(local.news_to, News::ErrorState(bus));
+        if bus != local.known_bus {
+            local.known_bus = bus;
+            publish(&mut local.news_to, News::ErrorState(bus));
         }
-        local.supervisor.arm(if control.network_ready {
+        supervisor.arm(if control.network_ready {
             control.operational
         } else {
             0
         });
         while let Some(order) = local.orders.dequeue() {
             match order {
-                Order::Heartbeat(time) => *local.heartbeat_time = time,
-                Order::Consumer(node, time) => local.supervisor.set_consumer_time(node, time),
-                Order::Watch(other) => local.supervisor.watch(other),
+                Order::Heartbeat(time) => local.heartbeat_time = time,
+                Order::Consumer(node, time) => supervisor.set_consumer_time(node, time),
+                Order::Watch(other) => supervisor.watch(other),
             }
         }
-        if control.speaking && local.heartbeat.period() != *local.heartbeat_time {
-            local.heartbeat.set_period(*local.heartbeat_time, now);
+        if control.speaking && local.heartbeat.period() != local.heartbeat_time {
+            local.heartbeat.set_period(local.heartbeat_time, now);
         }
         if let Some(frame) = local.heartbeat.poll(now, control.state())
             && control.speaking
@@ -504,7 +523,7 @@ mod app {
                 .go_on(control.operational, &mut cx.shared.lines);
         }
         if local.milliseconds.is_multiple_of(design::LED_MS) {
-            let lost = local.supervisor.any_lost();
+            let lost = supervisor.any_lost();
             local.run_led.set(leds::run(&control, now));
             local.error_led.set(leds::error(&control, bus, lost, now));
         }
@@ -517,12 +536,14 @@ mod app {
                 .shared
                 .lines
                 .lock(|lines| lines.iter().map(|line| line.planned.overflows()).sum());
-            measured::second(local.asleep, overruns);
-            publish(local.news_to, News::Measured);
+            if measured::ON {
+                measured::second(&mut local.asleep, overruns);
+                publish(&mut local.news_to, News::Measured);
+            }
             let counts = Counts::now(overruns, wrong_length, overflows);
-            if counts != *local.counts {
-                *local.counts = counts;
-                publish(local.news_to, News::Counts(counts));
+            if counts != local.counts {
+                local.counts = counts;
+                publish(&mut local.news_to, News::Counts(counts));
             }
         }
         wake::if_due(counter);
@@ -530,7 +551,7 @@ mod app {
         if roll::complete() {
             local.watchdog.feed();
         }
-        measured::give(Figure::Network, cx.shared.phase.ticks_since(begun));
+        measured::ran(Figure::Network, *cx.shared.phase, begun);
     }
 
     /// Boots, checks and configures the nodes, all at once, starts them, and
@@ -542,15 +563,12 @@ mod app {
     /// resets the board.
     #[task(
         priority = 1,
-        local = [
-            reset_cause, clock, boot, director, panel, answers, transfer_answers, states, news, events, own, requests, orders_to,
-            sync_period, store,
-        ],
+        local = [configurator],
         shared = [od, sender, lines, control, commands, axes]
     )]
     async fn sdo_configurator(cx: sdo_configurator::Context) {
         let mut wake = wake::reader();
-        let mut configurator = Configurator::new(cx.local, cx.shared);
+        let mut configurator = Configurator::new(cx.local.configurator, cx.shared);
         loop {
             configurator.round();
             wake.wait().await;

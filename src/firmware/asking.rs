@@ -9,7 +9,7 @@ use crate::{
     lines::{self, Lines, SYNCS},
 };
 use canmaster::{
-    Frame, NodeId,
+    Frame, NodeId, design,
     id::{Address, CobId, FunctionCode},
     objects,
 };
@@ -77,7 +77,6 @@ impl Asking {
             if every == 0 || syncs.wrapping_sub(*last) < u32::from(every) {
                 continue;
             }
-            *last = syncs;
             for _ in 0..AXES {
                 *turn = (*turn + 1) % AXES as u8;
                 let axis = usize::from(*turn);
@@ -89,7 +88,10 @@ impl Asking {
                     && let Some(node) = NETWORK.nodes.get(axis)
                 {
                     let frame = request(UPLOAD, objects::ERROR_REGISTER, node.id, 0);
-                    lines::send(lines, frame, 1);
+                    // Behind the board's own answers; the last request has gone.
+                    if lines::send(lines, frame, design::OWN_FRAMES + 1) {
+                        *last = syncs;
+                    }
                     break;
                 }
             }

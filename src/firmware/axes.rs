@@ -7,9 +7,11 @@ use crate::{
 };
 use canmaster::{
     cia402::StatusWord,
-    master::{Cycle, MasterOd, Ramps, TpdoSlot},
+    design,
+    master::{Cycle, MasterOd, Overload, Ramps, TpdoSlot},
     motion::{
-        AxisCommand, AxisFeedback, Group, GroupEvent, GroupState, Inputs, Order, Speedometer,
+        AxisCommand, AxisFeedback, FaultCause, Group, GroupEvent, GroupState, Inputs, Order,
+        Speedometer,
     },
     network::Network,
 };
@@ -26,6 +28,9 @@ const SPEEDOMETERS: [Speedometer; AXES] = {
     all
 };
 
+/// No axis has this number.
+const ALL_AXES: usize = usize::MAX;
+
 /// The group with what surrounds it.
 #[expect(unreachable_pub, reason = "RTIC wants shared resources to be public")]
 pub struct Axes {
@@ -35,8 +40,10 @@ pub struct Axes {
     /// program.
     pub(crate) pressed: bool,
     feedback: [AxisFeedback; AXES],
-    commands: [AxisCommand; AXES],
     ramps: Ramps<AXES>,
+    overload: Overload,
+    /// RPDOs of the last cycle did not get out.
+    unsent: bool,
     speed: [Speedometer; AXES],
 }
 
@@ -47,8 +54,9 @@ impl Axes {
             group,
             pressed: false,
             feedback: [AxisFeedback::default(); AXES],
-            commands: [AxisCommand::default(); AXES],
             ramps: Ramps::new(),
+            overload: Overload::new(design::LATE_CYCLES_MAX),
+            unsent: false,
             speed: SPEEDOMETERS,
         }
     }
@@ -71,22 +79,34 @@ impl Axes {
 
     /// Steps the group. A press of the button stops the motion, and else asks for
     /// one.
-    pub(crate) fn step(&mut self, control: &Control) {
+    pub(crate) fn step(
+        &mut self,
+        cycle: &Cycle,
+        control: &Control,
+        commands: &mut [AxisCommand; AXES],
+    ) {
+        let state = self.group.state();
         let moving = self.moves();
         if control.pressed && moving {
             // Refused in no state in which the group moves.
             let _ = self.group.order(Order::Stop);
         }
         self.pressed |= control.pressed && !moving;
+        let unsent = core::mem::take(&mut self.unsent);
+        let late = self.overload.cycle(cycle.passed, unsent);
+        let led = !matches!(state, GroupState::Idle | GroupState::Faulted);
+        let late = late.filter(|_| led && state != GroupState::FaultStop);
+        let late = late.map(|cycles| (ALL_AXES, FaultCause::CyclesLate { cycles }));
         let inputs = Inputs {
             network_ready: control.network_ready
                 && control.leads()
                 && !control.bus_off
                 && !control.cycle_differs,
-            fault: control.fault,
+            fault: control.fault.or(late),
+            passed: cycle.passed,
             absent: !control.operational,
         };
-        self.group.step(&inputs, &self.feedback, &mut self.commands);
+        self.group.step(&inputs, &self.feedback, commands);
     }
 
     /// Whether what is planned counts.
@@ -95,11 +115,6 @@ impl Axes {
             self.group.state(),
             GroupState::Moving | GroupState::Homing | GroupState::ModeChange
         )
-    }
-
-    /// What the axes are told.
-    pub(crate) const fn commands(&self) -> &[AxisCommand; AXES] {
-        &self.commands
     }
 
     /// Whether an axis is enabled or led there. What was last heard of a node that
@@ -118,22 +133,35 @@ impl Axes {
         self.group.take_event()
     }
 
-    /// Writes the RPDOs of the next cycle.
-    pub(crate) fn write(&mut self, cycle: &Cycle, lines: &mut impl Mutex<T = Lines>) {
+    /// It is too late for the RPDOs of this cycle.
+    pub(crate) const fn skip(&mut self) {
+        self.unsent = true;
+    }
+
+    /// Writes the RPDOs of the next cycle. Whether any of them may go before the
+    /// next SYNC.
+    pub(crate) fn write(
+        &mut self,
+        cycle: &Cycle,
+        commands: &[AxisCommand; AXES],
+        lines: &mut impl Mutex<T = Lines>,
+    ) -> bool {
+        let mut any = false;
         lines.lock(|lines| {
             for line in lines.iter_mut() {
-                line.begin(cycle.sync);
+                self.unsent |= line.begin(cycle.sync);
             }
         });
-        let due = self.ramps.due(&self.commands);
+        let due = self.ramps.due(commands);
         let nodes = self.network.nodes.iter().zip(&PDOS);
-        for (axis, ((node, pdos), command)) in nodes.zip(&self.commands).enumerate() {
+        for (axis, ((node, pdos), command)) in nodes.zip(commands).enumerate() {
             let on_change = RAMPS_ON_CHANGE.get(axis).is_some_and(|on| *on);
             let ramps = match on_change && due != Some(axis) {
                 true => None,
                 false => pdos.ramps(command, node.id),
             };
             let cyclic = pdos.cyclic(command, node.id);
+            any |= !RPDOS_AFTER_SYNC || on_change && ramps.is_some();
             lines.lock(|lines| {
                 let bus = AXIS_BUSES.get(axis).map(|bus| usize::from(*bus));
                 let Some(line) = bus.and_then(|bus| lines.get_mut(bus)) else {
@@ -151,5 +179,6 @@ impl Axes {
                 }
             });
         }
+        any
     }
 }

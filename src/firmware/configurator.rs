@@ -3,33 +3,59 @@
 
 use crate::{
     app::app::{CLOCK, NETWORK, sdo_configurator as task},
-    derived::PROGRAM,
+    derived::{AXES, PROGRAM},
     duties::Silent,
     lines::SYNCS,
-    log::{self, Log},
+    log::{self, Log, News},
     modes::Modes,
+    own_node::{Order, OwnNode, Storage},
     roll::{self, Task},
     transfer::{self, Transfer},
     wake,
 };
 use canmaster::{
+    Frame,
+    boot::NetworkBoot,
     design,
     device::{Event, MasterError, Setting},
-    motion::GroupEvent,
+    motion::{Director, GroupEvent, panel::Panel},
     nmt::State,
     time::{Duration, Instant},
 };
 use core::sync::atomic::Ordering::Relaxed;
-use nucleo_g474re::reset_cause::ResetCause;
+use heapless::spsc::{Consumer, Producer};
+use nucleo_g474re::{
+    reset_cause::ResetCause,
+    timers::{Microseconds, SyncPeriod},
+};
 use rtic::Mutex;
 
 /// So many cycles are longer than the period in any case.
 const CYCLES_MAX: u32 = 1000;
 const CYCLE_US: u32 = NETWORK.cycle.as_micros();
 
+/// What is the task's alone.
+pub(crate) struct Parts {
+    pub(crate) reset_cause: ResetCause,
+    pub(crate) clock: Microseconds,
+    pub(crate) boot: &'static mut NetworkBoot<AXES>,
+    pub(crate) director: &'static mut Director<AXES>,
+    pub(crate) panel: &'static mut Panel<AXES>,
+    pub(crate) answers: Consumer<'static, Frame>,
+    pub(crate) transfer_answers: Consumer<'static, Frame>,
+    pub(crate) states: Consumer<'static, Frame>,
+    pub(crate) news: Consumer<'static, News>,
+    pub(crate) events: Consumer<'static, GroupEvent>,
+    pub(crate) own: &'static mut OwnNode,
+    pub(crate) requests: Consumer<'static, Frame>,
+    pub(crate) orders_to: Producer<'static, Order>,
+    pub(crate) sync_period: SyncPeriod,
+    pub(crate) store: Option<Storage>,
+}
+
 /// The task with what it has.
 pub(crate) struct Configurator<'a> {
-    pub(crate) local: task::LocalResources<'a>,
+    pub(crate) local: &'a mut Parts,
     pub(crate) shared: task::SharedResources<'a>,
     pub(crate) log: Log,
     silent: Silent,
@@ -41,16 +67,13 @@ pub(crate) struct Configurator<'a> {
 
 impl<'a> Configurator<'a> {
     /// Tells how the board was started, and takes over its settings.
-    pub(crate) fn new(
-        local: task::LocalResources<'a>,
-        shared: task::SharedResources<'a>,
-    ) -> Configurator<'a> {
+    pub(crate) fn new(local: &'a mut Parts, shared: task::SharedResources<'a>) -> Configurator<'a> {
         log::started(
-            *local.reset_cause,
+            local.reset_cause,
             NETWORK.master.silence.as_millis(),
             local.store.is_some(),
         );
-        if *local.reset_cause == ResetCause::Watchdog {
+        if local.reset_cause == ResetCause::Watchdog {
             local.own.device.raise(MasterError::Watchdog);
         }
         let mut configurator = Configurator {
@@ -81,7 +104,7 @@ impl<'a> Configurator<'a> {
         let tested = transfer::go_on(
             &mut self.transfer,
             self.local.own.device.transfer(),
-            self.local.transfer_answers,
+            &mut self.local.transfer_answers,
             &mut self.shared.lines,
             now,
         );

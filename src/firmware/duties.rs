@@ -34,7 +34,7 @@ impl Configurator<'_> {
         let board = &mut Mirror {
             network: NETWORK,
             boot: self.local.boot,
-            store: self.local.store,
+            store: &mut self.local.store,
             od: &mut self.shared.od,
             commands: &mut self.shared.commands,
             axes: &mut self.shared.axes,

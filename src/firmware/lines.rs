@@ -57,8 +57,12 @@ impl Sender {
         let Some(&controller) = controller else {
             return;
         };
-        let waits = holds(&can::pending(controller), CobId::SYNC);
-        if waits || self.tx.transmit(controller, &self.sync).is_err() {
+        let pending = can::pending(controller, can::waiting(controller));
+        let waits = holds(&pending, CobId::SYNC);
+        let Some(buffers) = can::Buffers::of(controller) else {
+            return;
+        };
+        if waits || self.tx.transmit(buffers, &self.sync) == can::BUFFERS {
             counters::SYNC_NOT_SENT.add(1);
         }
     }
@@ -77,6 +81,8 @@ pub struct Line {
     second: bool,
     /// The SYNC after whose TPDOs they were made.
     made_after: u32,
+    /// RPDOs were dropped since [`begin`](Line::begin) was called.
+    late: bool,
     /// Everything else.
     pub(crate) planned: TxQueue<{ derived::TX_QUEUE }>,
     /// The cycle that `left` is for.
@@ -96,23 +102,28 @@ impl Line {
             early: [const { Burst::new() }; 2],
             second: false,
             made_after: 0,
+            late: false,
             planned: TxQueue::new(),
             cycle: 0,
             left: 0,
         }
     }
 
-    /// Takes the RPDOs of another cycle. Those that were not sent are counted.
-    pub(crate) fn begin(&mut self, sync: u32) {
-        self.drop_late();
+    /// Takes the RPDOs of another cycle. Whether some of those before were not sent;
+    /// these are counted.
+    pub(crate) fn begin(&mut self, sync: u32) -> bool {
+        let left = self.burst.begin();
+        self.drop_late(left);
         if EARLY {
             self.early(false).begin();
         }
         self.made_after = sync;
+        core::mem::take(&mut self.late)
     }
 
-    fn drop_late(&mut self) {
-        counters::RPDO_REPLACED.add(self.burst.begin() as u32);
+    fn drop_late(&mut self, left: usize) {
+        counters::RPDO_REPLACED.add(left as u32);
+        self.late |= left != 0;
     }
 
     /// An RPDO of every cycle, to be sent in its own or after the next SYNC.
@@ -141,42 +152,44 @@ impl Line {
     }
 
     /// What is to be given to the controller next.
+    #[inline(always)]
     fn next(&mut self, bus: usize, pending: &Pending, phase: Phase) -> Option<Frame> {
         let waits = !self.planned.is_empty();
-        if !PRODUCING.load(Relaxed) {
-            let planned = self.planned.next(pending);
-            return planned.or_else(|| self.next_rpdo(pending));
+        if !waits && !self.rpdos_wait() {
+            return None;
         }
-        if phase.left_us() < GUARD_US + FRAME_US {
+        let producing = PRODUCING.load(Relaxed);
+        if producing && phase.left_us() < GUARD_US + FRAME_US {
             return None;
         }
         let syncs = SYNCS.load(Relaxed);
         if EARLY {
-            if self.made_after != syncs && !self.early(false).is_over() {
-                counters::RPDO_REPLACED.add(self.early(true).begin() as u32);
+            if (!producing || self.made_after != syncs) && !self.early(false).is_over() {
+                let left = self.early(true).begin();
+                self.drop_late(left);
                 self.second = !self.second;
             }
             // Before the planned frames, which would take a buffer from them for long.
             if !self.early(true).is_over() {
-                return self.early(true).next(pending);
+                return self.early(true).next(pending).copied();
             }
         }
-        if waits && let Some(frame) = self.next_planned(bus, pending, syncs, phase) {
+        if waits && let Some(frame) = self.next_planned(bus, pending, producing, phase) {
             return Some(frame);
         }
-        if self.made_after == syncs {
-            return self.burst.next(pending);
+        if producing && self.made_after != syncs {
+            // Made too late for its own cycle, nothing is sent in the next.
+            let left = self.burst.begin();
+            self.drop_late(left);
+            return None;
         }
-        // Made too late for its own cycle, nothing is sent in the next.
-        self.drop_late();
-        None
+        self.burst.next(pending).copied()
     }
 
     #[inline(always)]
-    fn is_empty(&self) -> bool {
+    fn rpdos_wait(&self) -> bool {
         let [first, second] = &self.early;
-        let early = EARLY && !(first.is_over() && second.is_over());
-        self.planned.is_empty() && self.burst.is_over() && !early
+        !self.burst.is_over() || EARLY && !(first.is_over() && second.is_over())
     }
 
     /// The burst that is being sent, or the one that is made meanwhile.
@@ -194,23 +207,15 @@ impl Line {
         self.burst.is_over() && (!EARLY || self.early(true).is_over())
     }
 
-    fn next_rpdo(&mut self, pending: &Pending) -> Option<Frame> {
-        let early = if EARLY {
-            self.early(false).next(pending)
-        } else {
-            None
-        };
-        early.or_else(|| self.burst.next(pending))
-    }
-
     #[inline(never)]
     fn next_planned(
         &mut self,
         bus: usize,
         pending: &Pending,
-        syncs: u32,
+        producing: bool,
         phase: Phase,
     ) -> Option<Frame> {
+        let syncs = SYNCS.load(Relaxed);
         if syncs.wrapping_sub(self.cycle).cast_signed() > 0 {
             self.cycle = syncs;
             self.left = match ONE_PLANNED.get(bus) {
@@ -218,16 +223,17 @@ impl Line {
                 _ => u8::MAX,
             };
         }
-        if self.left == 0 {
+        let left = if producing { self.left } else { u8::MAX };
+        if left == 0 {
             return None;
         }
         let us = phase.elapsed_us() as u16;
-        let free = self.left > 1;
+        let free = left > 1;
         let (from, until) = *derived::SDO_US.get(bus)?;
         let sdo = free || (from <= us && us < until && self.rpdos_are_sent());
         let until = match EARLY {
-            // After the RPDOs.
-            true => derived::TPDO_DEADLINE_US,
+            // Whenever the RPDOs are sent: TPDOs may have gone ahead of these.
+            true => u16::MAX,
             false => *derived::AFTER_SYNC_US.get(bus)?,
         };
         let others = free || us < until;
@@ -254,6 +260,18 @@ fn is_sdo(id: CobId) -> bool {
     )
 }
 
+/// Requests a frame under the ceiling of the SYNC. A function of its own, so that
+/// all registers are free for what happens meanwhile.
+#[inline(never)]
+fn request(
+    sender: &mut impl Mutex<T = Sender>,
+    buffers: can::Buffers,
+    element: can::Element,
+) -> usize {
+    let (element, to) = (element.made(), buffers.made());
+    sender.lock(|sender| sender.tx.transmit(to, &element))
+}
+
 /// Gives the controller of a bus what it has room for.
 #[inline(always)]
 pub(crate) fn refill(
@@ -262,35 +280,37 @@ pub(crate) fn refill(
     sender: &mut impl Mutex<T = Sender>,
     phase: Phase,
 ) {
-    let Some(&controller) = CONTROLLERS.get(bus) else {
+    let Some((&controller, buffers)) = CONTROLLERS
+        .get(bus)
+        .and_then(|controller| Some((controller, can::Buffers::of(*controller)?)))
+    else {
         return;
     };
-    if lines.lock(|lines| lines.get(bus).is_none_or(Line::is_empty)) {
+    let waiting = can::waiting(controller);
+    let room = room(waiting);
+    if room == 0 {
         return;
     }
-    let mut pending = can::pending(controller);
-    for _ in 0..room(&pending) {
-        let next = lines.lock(|lines| lines.get_mut(bus)?.next(bus, &pending, phase));
-        let Some(frame) = next else {
-            break;
+    // Its ceiling is the priority of the task that does this.
+    lines.lock(|lines| {
+        let Some(line) = lines.get_mut(bus) else {
+            return;
         };
-        // The frame is made ready before the SYNC is held off.
-        let element = element(&frame);
-        // Two other frames at most were pending, and a SYNC: there is room.
-        if sender
-            .lock(|sender| sender.tx.transmit(controller, &element))
-            .is_err()
-        {
-            counters::RPDO_REPLACED.add(1);
-        }
-        measured::add_bits(bus, frame.dlc().into());
-        for place in &mut pending {
-            if *place == can::FREE {
-                *place = frame.id().get();
+        let mut pending = can::pending(controller, waiting);
+        for _ in 0..room {
+            let Some(frame) = line.next(bus, &pending, phase) else {
                 break;
+            };
+            let sent = request(sender, buffers, element(&frame));
+            if let Some(place) = pending.get_mut(sent) {
+                *place = frame.id().get();
+            } else {
+                // Two frames at most were there, and a SYNC: it cannot come to this.
+                counters::RPDO_REPLACED.add(1);
             }
+            measured::add_bits(bus, frame.dlc().into());
         }
-    }
+    });
 }
 
 /// The frame as the controller wants it.
@@ -300,12 +320,30 @@ pub(crate) fn element(frame: &Frame) -> can::Element {
     can::Element::new(id, frame.is_remote(), frame.dlc(), frame.padded())
 }
 
+/// There may be something to send on a bus.
+static WANTED: [AtomicBool; BUSES] = [const { AtomicBool::new(false) }; BUSES];
+
 /// Has the controllers look for something to send.
 #[inline(always)]
 pub(crate) fn send_now() {
-    for interrupt in INTERRUPTS {
+    for (wanted, interrupt) in WANTED.iter().zip(INTERRUPTS) {
+        wanted.store(true, Relaxed);
         rtic::pend(interrupt);
     }
+}
+
+/// Whether that was asked for since the last call.
+#[inline(always)]
+pub(crate) fn take_wanted(bus: usize) -> bool {
+    let Some(wanted) = WANTED.get(bus) else {
+        return false;
+    };
+    let asked = wanted.load(Relaxed);
+    if asked {
+        // Who asks now is served by what follows.
+        wanted.store(false, Relaxed);
+    }
+    asked
 }
 
 /// Of each bus.

@@ -9,6 +9,11 @@ use crate::{
     derived::{BUSES, NETWORK},
 };
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
+use nucleo_g474re::timers::Phase;
+
+/// Off in the image that shows what all this costs: `cargo xtask bench
+/// self-measurement`.
+pub(crate) const ON: bool = !cfg!(feature = "unmeasured");
 
 /// A figure: the greatest since the start, or since a client began anew.
 #[derive(Clone, Copy)]
@@ -58,7 +63,8 @@ fn get(figure: Figure) -> u32 {
 /// A value of a figure. If two tasks give one at once the lesser may remain.
 #[inline(always)]
 pub(crate) fn give(figure: Figure, value: u32) {
-    if let Some(greatest) = FIGURE.get(figure as usize)
+    if ON
+        && let Some(greatest) = FIGURE.get(figure as usize)
         && value > greatest.load(Relaxed)
     {
         greatest.store(value, Relaxed);
@@ -72,7 +78,8 @@ pub(crate) fn sync_began(bus: usize, at: u16) {
         if get(Figure::Earliest) != 0 {
             give(Figure::Bits, bits.load(Relaxed));
         }
-        bits.store(0, Relaxed);
+        // The SYNC itself.
+        bits.store(FRAME_BITS, Relaxed);
     }
     give(Figure::Latest, at.into());
     give(Figure::Earliest, NEVER - u32::from(at));
@@ -81,16 +88,30 @@ pub(crate) fn sync_began(bus: usize, at: u16) {
 /// A frame of so many bytes is on a bus.
 #[inline(always)]
 pub(crate) fn add_bits(bus: usize, bytes: u32) {
-    if let Some(bits) = BITS.get(bus) {
+    if ON && let Some(bits) = BITS.get(bus) {
         let more = FRAME_BITS + bytes * u8::BITS;
         bits.store(bits.load(Relaxed).wrapping_add(more), Relaxed);
     }
 }
 
-/// The CPU has slept.
+/// The cycles of the core since the period began.
+#[inline(always)]
+pub(crate) fn ticks(phase: Phase) -> u32 {
+    if ON { phase.ticks() } else { 0 }
+}
+
+/// A task has run since it `began`, by [`ticks`].
+#[inline(always)]
+pub(crate) fn ran(figure: Figure, phase: Phase, began: u32) {
+    if ON {
+        give(figure, phase.ticks_since(began));
+    }
+}
+
+/// The CPU has slept for so many microseconds in all, modulo 2^32.
 #[inline(always)]
 pub(crate) fn slept(us: u32) {
-    ASLEEP.store(ASLEEP.load(Relaxed).wrapping_add(us), Relaxed);
+    ASLEEP.store(us, Relaxed);
 }
 
 /// A second is over; `asleep` is kept from one to the next.

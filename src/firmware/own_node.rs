@@ -24,7 +24,7 @@ use canmaster::{
     emcy::EmcyCode,
     frame::MAX_DATA,
     id::Address,
-    master::{IMAGE_BYTES, MasterOd, Notice, WrongLength},
+    master::{MasterOd, Notice, WrongLength},
     motion::{AxisCommand, Director, FaultCause, GroupEvent, GroupState, panel::Panel},
     network::Network,
     nmt::{Command, ErrorControl, NodeControl, State, Target},
@@ -162,7 +162,7 @@ where
 }
 
 /// The PDO `number`, counted from 1.
-fn pdo(image: &[u8; IMAGE_BYTES], number: u8) -> [u8; 8] {
+fn pdo(image: &[u8], number: u8) -> [u8; MAX_DATA] {
     let place = usize::from(number.wrapping_sub(1)) * MAX_DATA;
     let bytes = image.get(place..).and_then(|rest| rest.first_chunk());
     bytes.copied().unwrap_or_default()

@@ -47,7 +47,7 @@ impl Receiver {
         let Some(&controller) = CONTROLLERS.get(bus) else {
             return;
         };
-        let begun = self.phase.ticks();
+        let begun = measured::ticks(self.phase);
         let flags = self.rx.take_flags(controller);
         if flags.rare() {
             if flags.message_lost() {
@@ -56,8 +56,10 @@ impl Receiver {
             self.error_state(bus, sender, lines, states);
         }
         // First of all, so that the bus is not idle for longer than it must.
-        lines::refill(bus, lines, sender, self.phase);
-        if flags.sent_at() {
+        if lines::take_wanted(bus) || flags.sent() {
+            lines::refill(bus, lines, sender, self.phase);
+        }
+        if measured::ON && flags.sent_at() {
             while let Some(at) = self.rx.take_sent_at(controller) {
                 measured::sync_began(bus, at);
             }
@@ -74,7 +76,7 @@ impl Receiver {
                 self.other(&element, bus);
             }
         }
-        measured::give(Figure::CanIrq, self.phase.ticks_since(begun));
+        measured::ran(Figure::CanIrq, self.phase, begun);
     }
 
     #[inline(never)]

@@ -10,7 +10,6 @@ const BITS: u8 = 32;
 /// The questions of one scan and what follows from the answers.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Fastscan {
-    known: [Option<u32>; 4],
     found: [u32; 4],
     part: Part,
     /// Bits of the part that are not known yet; 0: the whole number is to be
@@ -31,10 +30,9 @@ pub(crate) enum Verdict {
 }
 
 impl Fastscan {
-    /// Numbers that are known are only confirmed.
-    pub(crate) const fn new(known: [Option<u32>; 4]) -> Fastscan {
+    /// Nothing has been asked yet.
+    pub(crate) const fn new() -> Fastscan {
         Fastscan {
-            known,
             found: [0; 4],
             part: Part::Vendor,
             left: RESTART,
@@ -58,13 +56,14 @@ impl Fastscan {
         }
     }
 
-    pub(crate) fn answer(&mut self, yes: bool) -> Verdict {
-        match (self.left, yes) {
+    /// Numbers that are `known` are only confirmed.
+    pub(crate) fn answer(&mut self, yes: bool, known: impl FnOnce(Part) -> Option<u32>) -> Verdict {
+        self.part = match (self.left, yes) {
             (RESTART, false) => return Verdict::Nobody,
-            (RESTART, true) => self.begin(Part::Vendor),
+            (RESTART, true) => Part::Vendor,
             (0, false) => return Verdict::Lost(self.part),
             (0, true) => match self.part.next() {
-                Some(next) => self.begin(next),
+                Some(next) => next,
                 None => return Verdict::Found(LssAddress::from(self.found)),
             },
             (_, yes) => {
@@ -72,21 +71,15 @@ impl Fastscan {
                 if !yes {
                     self.set(self.number() | 1 << self.left);
                 }
+                return Verdict::Continue;
             }
+        };
+        self.left = BITS;
+        if let Some(number) = known(self.part) {
+            self.set(number);
+            self.left = 0;
         }
         Verdict::Continue
-    }
-
-    fn begin(&mut self, part: Part) {
-        self.part = part;
-        let known = self.known.get(usize::from(part.position()));
-        match known.copied().flatten() {
-            Some(number) => {
-                self.set(number);
-                self.left = 0;
-            }
-            None => self.left = BITS,
-        }
     }
 
     fn number(&self) -> u32 {

@@ -142,6 +142,7 @@ enum State {
     /// next one is asked only when all have had theirs, or a late answer would
     /// be taken for the answer to that.
     Scanning {
+        known: [Option<u32>; 4],
         scan: Fastscan,
         yes: bool,
     },
@@ -193,8 +194,8 @@ impl LssMaster {
                 (silence, Request::Activate { delay })
             }
             Service::Fastscan(known) => {
-                let scan = Fastscan::new(known);
-                (State::Scanning { scan, yes: false }, scan.question())
+                let (scan, yes) = (Fastscan::new(), false);
+                (State::Scanning { known, scan, yes }, scan.question())
             }
             Service::ConfigureNodeId(node) => (State::Waiting(service), Request::NodeId(node)),
             Service::ConfigureBitTiming { table, index } => {
@@ -237,7 +238,7 @@ impl LssMaster {
                 Progress::Send(request.frame())
             }
             State::Waiting(_) => self.failed(LssError::Timeout),
-            State::Scanning { scan, yes } => self.scan(scan, yes, now),
+            State::Scanning { known, scan, yes } => self.scan(known, scan, yes, now),
             State::Silence {
                 delay,
                 before: true,
@@ -260,8 +261,9 @@ impl LssMaster {
             return Progress::Nothing;
         };
         match (self.state, answer) {
-            (State::Scanning { scan, .. }, Answer::Identified) => {
-                self.state = State::Scanning { scan, yes: true };
+            (State::Scanning { known, scan, .. }, Answer::Identified) => {
+                let yes = true;
+                self.state = State::Scanning { known, scan, yes };
                 Progress::Nothing
             }
             (State::Waiting(Service::Select(_)), Answer::Selected) => self.done(Outcome::Confirmed),
@@ -284,10 +286,18 @@ impl LssMaster {
         }
     }
 
-    fn scan(&mut self, mut scan: Fastscan, yes: bool, now: Instant) -> Progress {
-        match scan.answer(yes) {
+    fn scan(
+        &mut self,
+        known: [Option<u32>; 4],
+        mut scan: Fastscan,
+        yes: bool,
+        now: Instant,
+    ) -> Progress {
+        let number = |part: Part| known.get(usize::from(part.position())).copied().flatten();
+        match scan.answer(yes, number) {
             Verdict::Continue => {
-                self.state = State::Scanning { scan, yes: false };
+                let yes = false;
+                self.state = State::Scanning { known, scan, yes };
                 self.deadline = now + self.timeout;
                 Progress::Send(scan.question().frame())
             }

@@ -42,14 +42,14 @@ impl<const N: usize> Burst<N> {
 
     /// The next frame, unless its identifier is one of those that are `pending` in
     /// the controller's buffers, which does not keep the order of equal ones.
-    #[inline]
-    pub fn next(&mut self, pending: &Pending) -> Option<Frame> {
+    #[inline(always)]
+    pub fn next(&mut self, pending: &Pending) -> Option<&Frame> {
         let frame = self.frames.get(self.sent)?;
         if holds(pending, frame.id()) {
             return None;
         }
         self.sent += 1;
-        Some(*frame)
+        Some(frame)
     }
 }
 
@@ -74,7 +74,7 @@ mod tests {
         }
         for id in [0x203, 0x201, 0x301] {
             assert!(!burst.is_over());
-            assert_eq!(burst.next(&[FREE, 0x700, FREE]), Some(frame(id)));
+            assert_eq!(burst.next(&[FREE, 0x700, FREE]), Some(&frame(id)));
         }
         assert!(burst.is_over());
         assert_eq!(burst.begin(), 0);
@@ -85,7 +85,7 @@ mod tests {
         let mut burst = Burst::<3>::new();
         burst.put(frame(0x201));
         assert_eq!(burst.next(&[0x201, FREE, FREE]), None);
-        assert_eq!(burst.next(&[FREE; 3]), Some(frame(0x201)));
+        assert_eq!(burst.next(&[FREE; 3]), Some(&frame(0x201)));
     }
 
     #[test]

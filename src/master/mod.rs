@@ -11,6 +11,7 @@ mod burst;
 mod clock;
 mod debounce;
 mod od;
+mod overload;
 mod ramps;
 mod roll_call;
 mod supervisor;
@@ -24,6 +25,7 @@ pub use debounce::Debounce;
 pub use od::{
     Cycle, IMAGE_BYTES, MasterOd, Reception, TPDOS_PER_AXIS, TpdoSlot, TpdoSlots, WrongLength,
 };
+pub use overload::Overload;
 pub use ramps::Ramps;
 pub use roll_call::RollCall;
 pub use supervisor::{Advice, Notice, Report, Supervisor};

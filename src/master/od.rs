@@ -197,7 +197,8 @@ impl<const AXES: usize> MasterOd<AXES> {
         let stored = self
             .tpdos
             .get_mut(slot.axis())
-            .and_then(|axis| axis.get_mut(first..first + MAX_DATA));
+            .and_then(|axis| axis.get_mut(first..))
+            .and_then(<[u8]>::first_chunk_mut);
         let (Some(mapped), Some(stored)) = (mapped, stored) else {
             return Reception::Stored;
         };
@@ -209,7 +210,7 @@ impl<const AXES: usize> MasterOd<AXES> {
                 return Reception::TooShort;
             }
         }
-        stored.copy_from_slice(&data);
+        *stored = data;
         if self.received.contains(slot) {
             return Reception::Stored;
         }

@@ -27,7 +27,10 @@ impl RollCall {
     #[inline]
     pub fn check_in(&self, task: u32) {
         let bit = 1_u32.checked_shl(task).unwrap_or(0);
-        self.missing.fetch_and(!bit, Ordering::Relaxed);
+        // Almost always it has been here before.
+        if self.missing.load(Ordering::Relaxed) & bit != 0 {
+            self.missing.fetch_and(!bit, Ordering::Relaxed);
+        }
     }
 
     /// Whether all have checked in since the last `true`. If so, the next round

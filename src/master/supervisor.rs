@@ -153,6 +153,8 @@ pub struct Supervisor<const N: usize> {
     nodes: Vec<Watched, N>,
     /// A node that the network does not name, and 1016h does.
     other: Option<Consumer>,
+    /// As [`arm`](Supervisor::arm) was last told.
+    armed: u32,
 }
 
 impl<const N: usize> Supervisor<N> {
@@ -172,12 +174,18 @@ impl<const N: usize> Supervisor<N> {
         Supervisor {
             nodes: watched.collect(),
             other: None,
+            armed: 0,
         }
     }
 
     /// Which nodes have to stay operational from now on: bit n for the one at
     /// place n. Whoever was lost is watched again as soon as its bit is back.
     pub fn arm(&mut self, operational: u32) {
+        // Every millisecond the same.
+        if operational == self.armed {
+            return;
+        }
+        self.armed = operational;
         for (place, node) in self.nodes.iter_mut().enumerate() {
             let armed = operational
                 .checked_shr(place as u32)

@@ -8,13 +8,13 @@ use heapless::Vec;
 
 /// The buffers that frames other than SYNC may occupy. A third stays free, so
 /// that a SYNC never waits for more than the frame on the wire.
-const SHARED_BUFFERS: usize = 2;
+const SHARED_BUFFERS: u32 = 2;
+/// All of them.
+const BUFFERS: usize = 3;
 /// The identifiers of SDO begin here.
 const SDO: u16 = FunctionCode::SdoResponse.base();
 /// The bits of an identifier that tell its function.
 const FUNCTION: u16 = !(NodeId::MAX.get() as u16);
-/// The largest identifier.
-const ID_MAX: u16 = 0x7FF;
 
 /// The queue is full: the frame was not taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,16 +35,23 @@ pub enum Put {
 
 /// The identifiers of the frames in the controller's three buffers; numbers above
 /// 7FFh stand for buffers without a frame.
-pub type Pending = [u16; 3];
+pub type Pending = [u16; BUFFERS];
 
-/// How many more frames other than SYNC the controller may be given.
+/// How many more frames the controller may be given, bit n of `waiting` being set
+/// if its buffer n holds one. A SYNC counts: it leaves soon, and the controller
+/// tells when.
 #[inline(always)]
-pub fn room(pending: &Pending) -> usize {
-    const fn other(id: u16) -> usize {
-        (id <= ID_MAX && id != CobId::SYNC.get()) as usize
-    }
-    let [a, b, c] = *pending;
-    SHARED_BUFFERS.saturating_sub(other(a) + other(b) + other(c))
+pub fn room(waiting: u32) -> u8 {
+    const ROOM: [u8; 1 << BUFFERS] = {
+        let (mut all, mut waiting) = ([0; 1 << BUFFERS], 0);
+        let mut left: &mut [u8] = &mut all;
+        while let Some((room, more)) = left.split_first_mut() {
+            *room = SHARED_BUFFERS.saturating_sub(u32::count_ones(waiting)) as u8;
+            (left, waiting) = (more, waiting + 1);
+        }
+        all
+    };
+    ROOM.get(waiting as usize).copied().unwrap_or(0)
 }
 
 /// Whether a frame with the identifier `id` is `pending`.
@@ -62,21 +69,22 @@ const fn is_error_control(id: u16) -> bool {
 
 /// How urgent an identifier is: the lower, the more. Heartbeats come next to NMT:
 /// they are rare, and the drives stop without the master's, however much else
-/// there is to send. SDO requests are all alike, or those to the highest node-IDs
-/// would wait for longer than their timeout while the bus is full of the others.
+/// there is to send. SDO requests and answers are all alike, or those to the highest
+/// node-IDs would wait for longer than their timeout while the bus is full of the
+/// others, and all of them while a client reads the board's dictionary.
 const fn rank(id: CobId) -> u16 {
     let id = id.get();
     if is_error_control(id) {
         CobId::NMT.get() + 1
     } else if id >= SDO {
-        id & FUNCTION
+        SDO
     } else {
         id
     }
 }
 
 /// A queue of up to `N` frames: heartbeats first but for NMT, then the lowest
-/// identifier; SDO requests and equal identifiers first in, first out.
+/// identifier; SDO, LSS and equal identifiers first in, first out.
 #[derive(Debug, Default)]
 pub struct TxQueue<const N: usize> {
     /// The most urgent frame last.
@@ -138,9 +146,10 @@ impl<const N: usize> TxQueue<N> {
 
     /// Takes the frame to be given to the controller next.
     ///
-    /// `None` if two frames other than SYNC are there already, or if nothing
-    /// waits but identifiers that are: the controller does not keep the order of
-    /// equal identifiers, so it gets the next only when the last has left.
+    /// `None` if nothing waits but identifiers that are `pending` there: the
+    /// controller does not keep the order of equal identifiers, so it gets the next
+    /// only when the last has left. Whether there is [`room`] is for the caller to
+    /// see.
     ///
     /// While a heartbeat is in a buffer, SDO waits here: on a bus full of it no
     /// heartbeat, which has the lowest priority of all, would get through. Once
@@ -152,9 +161,6 @@ impl<const N: usize> TxQueue<N> {
 
     /// The same, of those whose identifier `may` go now.
     pub fn next_of(&mut self, pending: &Pending, may: impl Fn(CobId) -> bool) -> Option<Frame> {
-        if room(pending) == 0 {
-            return None;
-        }
         let [a, b, c] = *pending;
         let beating = is_error_control(a) || is_error_control(b) || is_error_control(c);
         let position = self.frames.iter().rposition(|queued| {
@@ -216,10 +222,10 @@ mod tests {
         assert_eq!(next(&mut queue, &heartbeat), None);
         // LSS makes pauses by itself.
         let lss = [FREE, 0x7E5, FREE];
-        assert_eq!(next(&mut queue, &lss), Some((0x5FF, 0)));
         // Whoever came first.
-        assert_eq!(next(&mut queue, &NONE), Some((0x602, 0)));
+        assert_eq!(next(&mut queue, &lss), Some((0x602, 0)));
         assert_eq!(next(&mut queue, &NONE), Some((0x601, 0)));
+        assert_eq!(next(&mut queue, &NONE), Some((0x5FF, 0)));
     }
 
     #[test]
@@ -271,10 +277,8 @@ mod tests {
 
     #[test]
     fn one_buffer_stays_free_for_sync() {
-        let mut queue = TxQueue::<8>::new();
-        queue.put(frame(0x201, 1)).unwrap();
-        assert_eq!(next(&mut queue, &[FREE, 0x301, 0x302]), None);
-        assert_eq!(next(&mut queue, &[0x080, 0x301, FREE]), Some((0x201, 1)));
+        let rooms: StdVec<_> = (0..9).map(room).collect();
+        assert_eq!(rooms, [2, 1, 1, 0, 1, 0, 0, 0, 0]);
     }
 
     #[test]

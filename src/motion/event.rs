@@ -132,6 +132,11 @@ pub enum FaultCause {
     },
     /// The planning did not keep up with the motion.
     PathDry,
+    /// Cycles in a row did not finish in time: the drives follow old commands.
+    CyclesLate {
+        /// So many.
+        cycles: u8,
+    },
 }
 
 in_words!(FaultCause {
@@ -166,6 +171,9 @@ in_words!(FaultCause {
     ),
     FaultCause::PathDry => ("no set-points in time: the processor is overloaded"),
     FaultCause::NetworkLost => ("the network is no longer complete"),
+    FaultCause::CyclesLate { cycles } => (
+        "{} cycles in a row did not finish in time: see 2F20h, take a longer cycle_us", cycles
+    ),
 });
 
 /// Why a release was not accepted. Nothing has been sent because of it.

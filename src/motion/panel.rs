@@ -462,6 +462,7 @@ fn code(cause: &FaultCause) -> u32 {
         FaultCause::NotDone { mode } => (12, mode as u16),
         FaultCause::ModeNotConfirmed { mode } => (13, mode as u16),
         FaultCause::PathDry => (14, 0),
+        FaultCause::CyclesLate { cycles } => (15, cycles.into()),
     };
     number << 16 | u32::from(detail)
 }

@@ -93,6 +93,20 @@ pub struct Identity {
     pub serial: Option<u32>,
 }
 
+impl Identity {
+    /// 1000h: 0; the sub-indices of 1018h: 1 ..= 4.
+    #[inline(never)]
+    pub(crate) const fn number(&self, n: u8) -> Option<u32> {
+        match n {
+            0 => self.device_type,
+            1 => self.vendor,
+            2 => self.product,
+            3 => self.revision,
+            _ => self.serial,
+        }
+    }
+}
+
 /// One PDO of a node, with the identifier of the predefined connection set.
 #[derive(Debug)]
 pub struct Pdo {

@@ -3,7 +3,7 @@
 //! (CiA 301, 7.2.4.3.8 .. 7.2.4.3.16).
 
 use super::abort::AbortCode;
-use super::command::{Answer, BLOCK_MAX, BlockSegment, Command, End, Request, SEGMENT_MAX};
+use super::command::{Answer, BLOCK_MAX, Command, End, Request, SEGMENT_MAX};
 use super::crc::Crc16;
 
 /// The codes of the commands that either side sends in the course of a block
@@ -71,54 +71,51 @@ impl Sender {
         self.sending
     }
 
-    /// The offset of the next segment of the block; `None` if it is complete.
-    pub(super) fn next_offset(&self) -> Result<Option<u32>, AbortCode> {
-        match self.sending {
-            true => self.offset(self.sequence).map(Some),
-            false => Ok(None),
-        }
+    /// The offset of the next segment of the block.
+    pub(super) fn next_offset(&self) -> Result<u32, AbortCode> {
+        self.offset(self.sequence)
     }
 
-    /// The next segment of the block: the first `len` bytes of `data`, which
-    /// belong at [`next_offset`](Sender::next_offset).
+    /// Makes `segment` the next one of the block: `len` bytes of those that belong at
+    /// [`next_offset`](Sender::next_offset) are in its space.
     pub(super) fn segment(
         &mut self,
-        data: [u8; SEGMENT_MAX],
+        segment: &mut Command,
         len: usize,
         last: bool,
-    ) -> Result<Command, AbortCode> {
-        let offset = self.offset(self.sequence)?;
-        let bytes = data.get(..len).unwrap_or(&data);
+    ) -> Result<(), AbortCode> {
+        let offset = self.next_offset()?;
         // What is sent again has been summed before.
         if self.use_crc && offset == self.summed {
-            self.crc = self.crc.update(bytes);
+            let bytes = segment.bytes();
+            self.crc = self.crc.update(bytes.get(..len).unwrap_or(bytes));
             self.summed = offset.checked_add(len as u32).ok_or(AbortCode::GENERAL)?;
         }
         self.sequence += 1;
         self.tail = last.then_some(len as u8);
         self.sending = !last && self.sequence < self.block_size;
-        let segment = BlockSegment {
-            last,
-            sequence: self.sequence,
-            data,
-        };
-        Ok(Command(segment.encode()))
+        segment.number(self.sequence, last);
+        Ok(())
     }
 
     /// The receiver tells how many segments of the block it has and how many it
-    /// wants in the next. Yields the end command once it has everything.
-    pub(super) fn acknowledged(&mut self, command: &Command) -> Result<Option<Command>, AbortCode> {
+    /// wants in the next. Once it has everything, nothing is [to be
+    /// sent](Sender::is_sending) but `end`, which becomes the end command.
+    pub(super) fn acknowledged(
+        &mut self,
+        command: &Command,
+        end: &mut Command,
+    ) -> Result<(), AbortCode> {
         let (sequence, block_size) = command.acknowledged();
         if sequence > self.sequence {
             return Err(AbortCode::SEQUENCE_NUMBER);
         }
         if let Some(tail) = self.tail.filter(|_| sequence == self.sequence) {
             self.sending = false;
-            let end = End {
-                unused: (SEGMENT_MAX as u8).saturating_sub(tail),
-                crc: self.crc.get(),
-            };
-            return Ok(Some(Command::block_end(END, end)));
+            let unused = (SEGMENT_MAX as u8).saturating_sub(tail);
+            let crc = self.crc.get();
+            *end = Command::block_end(END, End { unused, crc });
+            return Ok(());
         }
         self.fruitless = if sequence == 0 { self.fruitless + 1 } else { 0 };
         if self.fruitless > FRUITLESS_MAX {
@@ -129,7 +126,7 @@ impl Sender {
         self.sequence = 0;
         self.tail = None;
         self.sending = true;
-        Ok(None)
+        Ok(())
     }
 
     fn offset(&self, segments: u8) -> Result<u32, AbortCode> {
@@ -148,7 +145,8 @@ pub(super) struct Receiver {
     block_size: u8,
     /// The last segment of the block received in sequence.
     sequence: u8,
-    held: Option<[u8; SEGMENT_MAX]>,
+    /// No segment, with the number 0, before the first.
+    held: Command,
     /// The last segment of all is held; the end command is awaited.
     complete: bool,
     use_crc: bool,
@@ -165,7 +163,7 @@ impl Receiver {
         Receiver {
             block_size,
             sequence: 0,
-            held: None,
+            held: Command([0; 8]),
             complete: false,
             use_crc,
             crc: Crc16::new(),
@@ -180,68 +178,79 @@ impl Receiver {
         self.complete
     }
 
-    /// Takes in a segment and gives out the one before it, which is not the last.
-    /// A segment out of sequence is discarded with all that follow it in the
-    /// block.
+    /// Takes in a segment; `before` becomes the one before it, which is not the last,
+    /// if there was one: it has a number. A segment out of sequence is discarded with
+    /// all that follow it in the block.
     ///
     /// # Errors
     /// 05040003h if nothing but such segments comes.
     pub(super) fn segment(
         &mut self,
-        segment: &BlockSegment,
-    ) -> Result<Option<[u8; SEGMENT_MAX]>, AbortCode> {
+        segment: &Command,
+        before: &mut Command,
+    ) -> Result<(), AbortCode> {
+        let (sequence, last) = (segment.sequence(), segment.is_last_of_all());
         self.stalled = false;
-        self.over = segment.last || segment.sequence >= self.block_size;
-        if segment.sequence != self.sequence + 1 {
+        self.over = last || sequence >= self.block_size;
+        if sequence != self.sequence + 1 {
             if self.stray >= STRAY_MAX {
                 return Err(AbortCode::SEQUENCE_NUMBER);
             }
             self.stray += 1;
-            return Ok(None);
+            return Ok(());
         }
-        self.sequence = segment.sequence;
-        self.complete = segment.last;
+        self.sequence = sequence;
+        self.complete = last;
         self.stray = 0;
-        let before = self.held.replace(segment.data);
-        if let Some(before) = &before {
-            self.crc = self.crc.update(before);
+        *before = core::mem::replace(&mut self.held, *segment);
+        if before.sequence() != 0 {
+            self.crc = self.crc.update(before.bytes());
         }
-        Ok(before)
+        Ok(())
     }
 
-    /// The acknowledgement, if the block is over.
-    pub(super) fn over(&mut self) -> Option<Command> {
-        core::mem::take(&mut self.over).then(|| self.acknowledge())
+    /// Whether the block is over; then `answer` becomes the acknowledgement.
+    pub(super) fn over(&mut self, answer: &mut Command) -> bool {
+        let over = core::mem::take(&mut self.over);
+        if over {
+            self.acknowledge(answer);
+        }
+        over
     }
 
-    /// Nothing has come for a while: the acknowledgement that lets the sender
-    /// repeat the rest. `None` the second time in a row, or if there is nothing
-    /// to repeat.
-    pub(super) fn stall(&mut self) -> Option<Command> {
+    /// Nothing has come for a while: `answer` becomes the acknowledgement that lets the
+    /// sender repeat the rest. Not the second time in a row, nor if there is nothing to
+    /// repeat.
+    pub(super) fn stall(&mut self, answer: &mut Command) -> bool {
         if self.stalled || self.complete {
-            return None;
+            return false;
         }
         self.stalled = true;
-        Some(self.acknowledge())
+        self.acknowledge(answer);
+        true
     }
 
-    fn acknowledge(&mut self) -> Command {
+    fn acknowledge(&mut self, answer: &mut Command) {
         let sequence = core::mem::take(&mut self.sequence);
-        Command::acknowledge(ACKNOWLEDGE, sequence, self.block_size)
+        *answer = Command::acknowledge(ACKNOWLEDGE, sequence, self.block_size);
     }
 
-    /// The end command has come: the bytes of the last segment, if the
+    /// The end command has come: how many bytes of the last segment count, if the
     /// checksum is right.
-    pub(super) fn end(&self, end: End) -> Result<([u8; SEGMENT_MAX], usize), AbortCode> {
-        let held = self
-            .held
-            .filter(|_| self.complete)
-            .ok_or(AbortCode::COMMAND)?;
+    pub(super) fn end(&self, end: End) -> Result<usize, AbortCode> {
+        if !self.complete {
+            return Err(AbortCode::COMMAND);
+        }
         let len = SEGMENT_MAX.saturating_sub(usize::from(end.unused));
-        let crc = self.crc.update(held.get(..len).unwrap_or(&[])).get();
-        if self.use_crc && crc != end.crc {
+        let crc = self.crc.update(self.held.bytes().get(..len).unwrap_or(&[]));
+        if self.use_crc && crc.get() != end.crc {
             return Err(AbortCode::CRC);
         }
-        Ok((held, len))
+        Ok(len)
+    }
+
+    /// The last segment.
+    pub(super) const fn held(&self) -> &Command {
+        &self.held
     }
 }

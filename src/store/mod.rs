@@ -158,11 +158,14 @@ impl<F: NorFlash> Store<F> {
         let len = newest.len;
         let into = buf.get_mut(..len).ok_or(StoreError::Buffer { len })?;
         let mut at = newest.at;
+        let mut word = [0; WORD];
         for part in into.chunks_mut(WORD) {
             at += WORD as u32;
-            let word = self.read(at).ok_or(StoreError::Flash)?;
-            for (to, from) in part.iter_mut().zip(word.to_le_bytes()) {
-                *to = from;
+            if !self.read(at, &mut word) {
+                return Err(StoreError::Flash);
+            }
+            if let Some(word) = word.get(..part.len()) {
+                part.copy_from_slice(word);
             }
         }
         Ok(Some(into))
@@ -260,20 +263,26 @@ impl<F: NorFlash> Store<F> {
 
     /// The record in this place, if it is whole.
     fn check(&mut self, record: u32) -> Option<Newest> {
-        let mut at = record;
-        let first = self.read(at)?;
+        let mut word = [0; WORD];
+        if !self.read(record, &mut word) {
+            return None;
+        }
+        let first = u64::from_le_bytes(word);
         let len = usize::from((first >> LENGTH_AT) as u16);
         if first as u16 != MAGIC || len > CAPACITY {
             return None;
         }
         let mut crc = Crc32::new();
-        crc.update(&first.to_le_bytes());
-        for _ in 0..len.div_ceil(WORD) {
+        let mut at = record;
+        // The last word read is the checksum.
+        for _ in 0..=len.div_ceil(WORD) {
+            crc.update(&word);
             at += WORD as u32;
-            crc.update(&self.read(at)?.to_le_bytes());
+            if !self.read(at, &mut word) {
+                return None;
+            }
         }
-        let last = self.read(at + WORD as u32)?;
-        (last == trailer(crc.value())).then_some(Newest {
+        (u64::from_le_bytes(word) == trailer(crc.value())).then_some(Newest {
             at: record,
             sequence: (first >> SEQUENCE_AT) as u32,
             len,
@@ -281,15 +290,14 @@ impl<F: NorFlash> Store<F> {
     }
 
     fn is_blank(&mut self, at: u32) -> bool {
-        const BLANK: u64 = u64::from_le_bytes([ERASED; WORD]);
-        (0..RECORD / WORD).all(|n| self.read(at + (n * WORD) as u32) == Some(BLANK))
+        let mut word = [0; WORD];
+        (0..RECORD / WORD)
+            .all(|n| self.read(at + (n * WORD) as u32, &mut word) && word == [ERASED; WORD])
     }
 
-    /// A word; `None` if it cannot be read, as one that a power cut tore.
-    fn read(&mut self, at: u32) -> Option<u64> {
-        let mut word = [0; WORD];
-        self.flash.read(at, &mut word).ok()?;
-        Some(u64::from_le_bytes(word))
+    /// Reads a word; `false` if it cannot be read, as one that a power cut tore.
+    fn read(&mut self, at: u32, word: &mut [u8; WORD]) -> bool {
+        self.flash.read(at, word).is_ok()
     }
 }
 

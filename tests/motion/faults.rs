@@ -5,7 +5,7 @@ use canmaster::cia402::State;
 use canmaster::motion::experiment::GROUP;
 use canmaster::motion::mode::Mode;
 use canmaster::motion::{AxisCommand, Group, Inputs, Order};
-use canmaster::motion::{AxisFeedback, FaultCause, GroupState};
+use canmaster::motion::{AxisFeedback, FaultCause, GroupEvent, GroupState};
 use proptest::prelude::*;
 
 use crate::plant::Random;
@@ -154,7 +154,7 @@ proptest! {
             if let Some(order) = order {
                 let _ = group.order(order);
             }
-            group.step(&Inputs { network_ready, absent, fault }, &feedback, &mut out);
+            group.step(&Inputs { network_ready, absent, fault, passed: 1 }, &feedback, &mut out);
             for command in &out {
                 prop_assert!(command.target == 0 || command.mode.rpdo() == 2);
                 prop_assert_eq!(command.controlword & 1 << 4, 0);
@@ -163,4 +163,68 @@ proptest! {
             prop_assert_ne!(group.state(), GroupState::Moving);
         }
     }
+}
+
+/// Cycles in which no step was made have passed all the same.
+#[test]
+fn missed_cycles_count_for_the_time() {
+    let steps = |passed| -> u32 {
+        let mut group = Group::new(&GROUP);
+        let mut commands = [AxisCommand::default(); AXES];
+        let stuck = AxisFeedback {
+            statusword: 0x0240,
+            fresh: true,
+            ..AxisFeedback::default()
+        };
+        let inputs = Inputs { passed, ..READY };
+        let mut step = || {
+            group.step(&inputs, &[stuck; AXES], &mut commands);
+            group.state() != GroupState::FaultStop
+        };
+        (0..100_000).take_while(|_| step()).count() as u32
+    };
+    let each = steps(1);
+    assert!(each > 100, "{each}");
+    assert!(steps(10).abs_diff(each / 10) <= 2, "{}", steps(10));
+}
+
+/// And so they do for the references, also if a path begins in one of them.
+#[test]
+fn references_go_on_in_missed_cycles() {
+    const MISSED: u32 = 3;
+    for steps in 0..40 {
+        let gone_on = |each: u32| {
+            let mut rig = Rig::standby(7);
+            rig.released();
+            rig.go(far);
+            for _ in 0..steps {
+                rig.step(READY);
+            }
+            let inputs = Inputs {
+                passed: each,
+                ..READY
+            };
+            for _ in 0..MISSED / each {
+                rig.group.step(&inputs, &rig.feedback, &mut rig.commands);
+            }
+            assert_eq!(rig.group.state(), GroupState::Moving);
+            let references = [0, 1, 2, 3, 4, 5].map(|n| rig.group.view(n).unwrap().reference);
+            (rig.group.count(), references)
+        };
+        assert_eq!(gone_on(1), gone_on(MISSED), "after {steps} steps");
+    }
+}
+
+#[test]
+fn cycles_that_are_late_stop_the_group() {
+    let mut rig = Rig::moving(7, 100);
+    let cause = FaultCause::CyclesLate { cycles: 3 };
+    rig.step(Inputs {
+        fault: Some((usize::MAX, cause)),
+        ..READY
+    });
+    assert_eq!(rig.group.state(), GroupState::FaultStop);
+    let told = GroupEvent::Fault { axis: None, cause };
+    assert!(rig.events.contains(&told), "{}", rig.last());
+    rig.until(GroupState::Faulted, 300);
 }

@@ -225,4 +225,5 @@ pub(crate) const READY: Inputs = Inputs {
     network_ready: true,
     absent: 0,
     fault: None,
+    passed: 1,
 };

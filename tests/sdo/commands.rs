@@ -2,7 +2,7 @@
 
 use canmaster::id::Address;
 use canmaster::sdo::AbortCode;
-use canmaster::sdo::command::{Answer, BlockSegment, Command, End, Request, SEGMENT_MAX};
+use canmaster::sdo::command::{Answer, Command, End, Request};
 use proptest::prelude::*;
 
 const AT: Address = Address::new(0x6083, 0x01);
@@ -16,9 +16,10 @@ fn expedited(code: u8, data: &[u8]) -> Command {
 }
 
 fn segment(code: u8, toggle: bool, last: bool, data: &[u8]) -> Command {
-    let mut bytes = [0; SEGMENT_MAX];
-    bytes[..data.len()].copy_from_slice(data);
-    Command::segment(code, toggle, last, bytes, data.len())
+    let mut segment = Command::bare(code, toggle);
+    segment.space()[..data.len()].copy_from_slice(data);
+    segment.close(data.len(), last);
+    segment
 }
 
 #[test]
@@ -308,16 +309,18 @@ fn what_does_not_exist_is_no_command() {
 
 #[test]
 fn a_block_segment_has_a_number_instead_of_a_command() {
-    let last = BlockSegment {
-        last: true,
-        sequence: 3,
-        data: *b"1234567",
-    };
-    assert_eq!(last.encode(), *b"\x831234567");
-    assert_eq!(BlockSegment::decode(*b"\x831234567"), Some(last));
+    let mut last = Command([0; 8]);
+    *last.space() = *b"1234567";
+    last.number(3, true);
+    assert_eq!(last, Command(*b"\x831234567"));
+    assert_eq!((last.sequence(), last.is_last_of_all()), (3, true));
+    assert_eq!(last.bytes(), b"1234567");
+    last.number(127, false);
+    assert_eq!(last, Command(*b"\x7F1234567"));
+    assert_eq!((last.sequence(), last.is_last_of_all()), (127, false));
     // 0x80 is an abort, 0x00 nothing at all.
-    assert_eq!(BlockSegment::decode([0x80; 8]), None);
-    assert_eq!(BlockSegment::decode([0x00; 8]), None);
+    assert_eq!(Command([0x80; 8]).sequence(), 0);
+    assert_eq!(Command([0x00; 8]).sequence(), 0);
 }
 
 proptest! {
@@ -353,8 +356,10 @@ proptest! {
 
     #[test]
     fn a_block_segment_survives_a_round_trip(bytes: [u8; 8]) {
-        if let Some(segment) = BlockSegment::decode(bytes) {
-            prop_assert_eq!(segment.encode(), bytes);
-        }
+        let read = Command(bytes);
+        let mut made = Command([0; 8]);
+        *made.space() = *read.bytes();
+        made.number(read.sequence(), read.is_last_of_all());
+        prop_assert_eq!(made, read);
     }
 }

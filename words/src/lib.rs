@@ -60,7 +60,7 @@ fn packed_texts(input: TokenStream) -> Result<TokenStream> {
     if texts
         .iter()
         .flatten()
-        .any(|byte| !byte.is_ascii() || *byte == b'\\')
+        .any(|byte| !matches!(byte, b' '..=b'~') || *byte == b'\\')
     {
         return Err("only plain ASCII can be packed");
     }

@@ -1,8 +1,10 @@
 //! Texts in as few bytes as reading them with little code allows: the two bytes that
 //! stand side by side most often become one, again and again.
 
-/// The bytes from here on stand for two others.
+/// The bytes from here on, and past the last one those from 0 on, stand for two others;
+/// in between are the letters.
 const FIRST_PAIR: u8 = 128;
+const PAIRS: u8 = (u8::MAX - FIRST_PAIR + 1) + b' ';
 /// A pair takes two bytes in the table.
 const WORTH_IT: usize = 3;
 
@@ -20,7 +22,8 @@ impl Packed {
             pairs: Vec::new(),
             texts,
         };
-        for byte in FIRST_PAIR..=u8::MAX {
+        for number in 0..PAIRS {
+            let byte = FIRST_PAIR.wrapping_add(number);
             let Some(pair) = packed.most_frequent() else {
                 break;
             };
@@ -62,13 +65,28 @@ mod tests {
     use super::*;
 
     fn unpack(packed: &Packed, byte: u8, to: &mut Vec<u8>) {
-        match byte.checked_sub(FIRST_PAIR) {
+        match packed.pairs.get(usize::from(byte.wrapping_sub(FIRST_PAIR))) {
             None => to.push(byte),
             Some(pair) => {
-                for byte in packed.pairs[usize::from(pair)] {
-                    unpack(packed, byte, to);
+                for byte in pair {
+                    unpack(packed, *byte, to);
                 }
             }
+        }
+    }
+
+    #[test]
+    fn letters_stay_letters_however_many_pairs_there_are() {
+        let letters = (b' '..=b'~').flat_map(|a| [[a, b'a', a], [a, b'b', a], [a, b'a', a]]);
+        let texts: Vec<Vec<u8>> = letters.map(|text| text.repeat(2)).collect();
+        let packed = Packed::new(texts.clone());
+        assert_eq!(packed.pairs.len(), usize::from(PAIRS));
+        for (text, packed_text) in texts.iter().zip(&packed.texts) {
+            let mut unpacked = Vec::new();
+            for byte in packed_text {
+                unpack(&packed, *byte, &mut unpacked);
+            }
+            assert_eq!(&unpacked, text);
         }
     }
 

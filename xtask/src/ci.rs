@@ -20,9 +20,6 @@ const BOARD_CRATE: &str = "nucleo-g474re";
 
 /// What `test` and `ci` look at of each scenario of `bench realtime`, seconds.
 const REALTIME_S: f64 = 3.0;
-/// The scenarios. The others miss no cycle either, but take more of the core than
-/// they may.
-const REALTIME: [&str; 2] = ["two_bus_1ms", "one_bus_2ms_disturbed"];
 
 /// Name of the step that runs them.
 const TESTS: &str = "tests";
@@ -153,19 +150,14 @@ fn instructions() -> Result<()> {
 }
 
 fn real_time() -> Result<()> {
-    let each = |name| bench_of(Bench::Realtime, Some(name));
-    REALTIME.into_iter().try_for_each(each)
+    benched(Bench::Realtime)
 }
 
 fn benched(bench: Bench) -> Result<()> {
-    bench_of(bench, None)
-}
-
-fn bench_of(bench: Bench, scenario: Option<&str>) -> Result<()> {
     let options = BenchOptions {
         bench,
         seed: 1,
-        scenario: scenario.map(str::to_string),
+        scenario: None,
         seconds: Some(REALTIME_S),
         seeds: 1,
         accept: false,

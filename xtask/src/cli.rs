@@ -227,8 +227,8 @@ pub(crate) struct BenchOptions {
     /// Of `realtime`: only this scenario [default: all of them]
     #[arg(long, value_name = "NAME")]
     pub(crate) scenario: Option<String>,
-    /// Of `realtime` and `cycle`: simulated seconds of motion that are looked at
-    /// [default: 30 and 3]
+    /// Of `realtime`, `cycle` and `self-measurement`: simulated seconds of motion that
+    /// are looked at [default: 30, 3 and 3]
     #[arg(long, value_name = "S", value_parser = seconds)]
     pub(crate) seconds: Option<f64>,
     /// Of `realtime`: how many seeds, from --seed on
@@ -260,6 +260,10 @@ pub(crate) enum Bench {
     Instructions,
     /// The smallest cycle that holds for 1 .. 12 axes on one bus
     Cycle,
+    /// Both orders of the RPDOs, and both ways to find out that a drive is lost
+    Choices,
+    /// What it costs the board to measure itself
+    SelfMeasurement,
 }
 
 /// Severities as they are typed.

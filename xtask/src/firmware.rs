@@ -26,6 +26,9 @@ pub(crate) const IMAGE_VARIABLE: &str = "CANMASTER_ELF";
 /// The same for the image of [`UNHURRIED`](crate::networks::UNHURRIED).
 pub(crate) const IMAGE_10_MS_VARIABLE: &str = "CANMASTER_ELF_10_MS";
 
+/// Leaves the firmware's measuring of itself out.
+const UNMEASURED: &str = "unmeasured";
+
 /// Tells the build script of another description of the machine.
 const NETWORK_VARIABLE: &str = "CANMASTER_NETWORK";
 
@@ -72,6 +75,15 @@ pub(crate) fn build_for(description: &Path) -> Result<PathBuf> {
     let mut command = cargo_for_target("build");
     command.env(NETWORK_VARIABLE, description);
     make(command, &folder(description))
+}
+
+/// The same without the firmware's measuring of itself.
+pub(crate) fn build_unmeasured_for(description: &Path) -> Result<PathBuf> {
+    let mut command = cargo_for_target("build");
+    command
+        .args(["--features", UNMEASURED])
+        .env(NETWORK_VARIABLE, description);
+    make(command, &format!("{}-{UNMEASURED}", folder(description)))
 }
 
 /// A folder that belongs to one description: named like its own, and by a number

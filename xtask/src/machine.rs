@@ -131,6 +131,13 @@ impl Checked {
         }
     }
 
+    /// Builds the firmware for it without its measuring of itself, to be run.
+    pub(crate) fn built_unmeasured(&self) -> Result<Image> {
+        let path = self.path.as_deref();
+        let path = path.map_or_else(|| cargo::workspace().join(DESCRIPTION), Path::to_path_buf);
+        self.image(&firmware::build_unmeasured_for(&path)?)
+    }
+
     /// An image that was built for it.
     pub(crate) fn image(&self, elf: &Path) -> Result<Image> {
         let image = Image::read(elf).context("the firmware image cannot be run")?;

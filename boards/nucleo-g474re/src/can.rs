@@ -1,5 +1,4 @@
-//! FDCAN1, 2 and 3: the fdcan crate configures them, the way of each frame is
-//! here.
+//! FDCAN1, 2 and 3, with the bit timing and the interrupts of the fdcan crate.
 //!
 //! Not through that crate's own transmit and receive calls: they turn a frame
 //! without data into a remote frame, drop a frame when the buffers are full, and
@@ -85,13 +84,6 @@ fn registers(of: Controller) -> &'static RegisterBlock {
     unsafe { &*(address as *const RegisterBlock) }
 }
 
-/// Why a frame was not accepted for transmission.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TransmitError {
-    /// All three buffers hold frames.
-    Full,
-}
-
 /// The identifier that each buffer was last filled with.
 static IDENTIFIERS: [[AtomicU16; DEPTH]; CONTROLLERS as usize] =
     [const { [const { AtomicU16::new(FREE) }; DEPTH] }; CONTROLLERS as usize];
@@ -106,12 +98,64 @@ pub struct Tx {
     _only: (),
 }
 
-/// The identifiers of the frames that wait to be sent; [`FREE`] for a buffer
-/// without one. For any task: a frame that is requested meanwhile may be missing.
+/// The transmit buffers of a controller, looked up.
+#[derive(Clone, Copy)]
+pub struct Buffers {
+    registers: *const RegisterBlock,
+    elements: *mut u32,
+    held: *const [AtomicU16; DEPTH],
+}
+
+impl Buffers {
+    /// Those of a controller. `None`: there is no such controller.
+    #[inline(always)]
+    pub fn of(controller: Controller) -> Option<Buffers> {
+        Some(Buffers {
+            registers: registers(controller),
+            elements: message_ram::tx_buffers(controller),
+            held: IDENTIFIERS.get(controller.index())?,
+        })
+    }
+
+    /// The same, looked up here: see [`Element::made`].
+    #[inline(always)]
+    pub fn made(self) -> Buffers {
+        let Buffers {
+            mut registers,
+            mut elements,
+            mut held,
+        } = self;
+        // SAFETY: no instruction; the compiler takes it for one that needs the three
+        // pointers, which are the same afterwards.
+        unsafe {
+            core::arch::asm!(
+                "/* {0} {1} {2} */",
+                inout(reg) registers,
+                inout(reg) elements,
+                inout(reg) held,
+                options(readonly, nostack, preserves_flags)
+            );
+        }
+        Buffers {
+            registers,
+            elements,
+            held,
+        }
+    }
+}
+
+/// Which buffers hold a frame that waits to be sent: bit n for buffer n. For any
+/// task: a frame that is requested meanwhile may be missing.
 #[inline(always)]
-pub fn pending(of: Controller) -> [u16; BUFFERS] {
+pub fn waiting(of: Controller) -> u32 {
     // A request shows in TXBRP only when the controller's scan is done.
-    let waiting = registers(of).txbrp().read().bits() | registers(of).txbar().read().bits();
+    registers(of).txbrp().read().bits() | registers(of).txbar().read().bits()
+}
+
+/// The identifiers of the frames that wait to be sent, of those buffers that
+/// [`waiting`] names; [`FREE`] for the others.
+#[inline(always)]
+pub fn pending(of: Controller, waiting: u32) -> [u16; BUFFERS] {
     let mut pending = [FREE; BUFFERS];
     let (Some(held), true) = (IDENTIFIERS.get(of.index()), waiting != 0) else {
         // The way of almost every SYNC.
@@ -131,32 +175,25 @@ pub fn pending(of: Controller) -> [u16; BUFFERS] {
 }
 
 impl Tx {
-    /// Requests the transmission of `element`.
-    ///
-    /// # Errors
-    ///
-    /// [`TransmitError::Full`]: nothing was changed.
+    /// Requests the transmission of `element`. The number of the buffer that it is
+    /// in; [`BUFFERS`]: all hold frames, and nothing was changed.
     #[inline(always)]
-    pub fn transmit(&mut self, by: Controller, element: &Element) -> Result<(), TransmitError> {
-        let status = registers(by).txfqs().read();
+    pub fn transmit(&mut self, by: Buffers, element: &Element) -> usize {
+        // SAFETY: both were made of references that are valid for ever.
+        let (registers, held) = unsafe { (&*by.registers, &*by.held) };
+        let status = registers.txfqs().read();
         let index = status.tfqpi().bits() as usize;
-        let held = IDENTIFIERS.get(by.index());
-        let (false, Some(held)) = (
-            status.tfqf().bit_is_set(),
-            held.and_then(|held| held.get(index)),
-        ) else {
-            return Err(TransmitError::Full);
+        let (false, Some(held)) = (status.tfqf().bit_is_set(), held.get(index)) else {
+            return BUFFERS;
         };
         held.store(element.identifier(), Relaxed);
         // SAFETY: the clock was switched on by `setup`; the index was checked
         // against three above; the put index names a buffer without a request;
         // `&mut self` is the only way to Tx buffers.
-        unsafe { message_ram::write_tx(by, index, element) };
+        unsafe { message_ram::write_tx(by.elements, index, element) };
         // SAFETY: a request bit of a buffer that has just been filled.
-        registers(by)
-            .txbar()
-            .write(|w| unsafe { w.bits(1 << index) });
-        Ok(())
+        registers.txbar().write(|w| unsafe { w.bits(1 << index) });
+        index
     }
 
     /// Takes back every frame that has not started, so that none goes out late:
@@ -204,6 +241,7 @@ const FLAG_FIFO_0: u32 = 1 << 0;
 const FLAG_FIFO_0_LOST: u32 = 1 << 2;
 const FLAG_FIFO_1: u32 = 1 << 3;
 const FLAG_FIFO_1_LOST: u32 = 1 << 5;
+const FLAG_SENT: u32 = 1 << 7;
 const FLAG_TX_EVENT: u32 = 1 << 10;
 const FLAG_ERROR_PASSIVE: u32 = 1 << 17;
 const FLAG_ERROR_WARNING: u32 = 1 << 18;
@@ -222,6 +260,12 @@ impl Flags {
             Fifo::Fifo1 => FLAG_FIFO_1,
         };
         self.0 & flag != 0
+    }
+
+    /// Frames were sent: there is room for others.
+    #[inline(always)]
+    pub fn sent(self) -> bool {
+        self.0 & FLAG_SENT != 0
     }
 
     /// A frame was sent of which the controller tells when.

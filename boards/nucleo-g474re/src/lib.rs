@@ -29,7 +29,6 @@ pub use stm32g4xx_hal::pac;
 use can::Controller;
 use pins::uses;
 use stm32g4xx_hal::{
-    can::CanExt,
     gpio::GpioExt,
     pwr::PwrExt,
     rcc::{Enable, RccExt},
@@ -113,25 +112,13 @@ pub fn setup<const CAN: u8>(peripherals: pac::Peripherals, config: &Config) -> D
     let [first, second, third] = &config.can;
     pac::FDCAN1::enable(&mut rcc);
     if uses(CAN, 0) {
-        can::setup(
-            peripherals.FDCAN1.fdcan_unchecked(),
-            Controller::FDCAN1,
-            first,
-        );
+        can::setup(Controller::FDCAN1, first);
     }
     if uses(CAN, 1) {
-        can::setup(
-            peripherals.FDCAN2.fdcan_unchecked(),
-            Controller::FDCAN2,
-            second,
-        );
+        can::setup(Controller::FDCAN2, second);
     }
     if uses(CAN, 2) {
-        can::setup(
-            peripherals.FDCAN3.fdcan_unchecked(),
-            Controller::FDCAN3,
-            third,
-        );
+        can::setup(Controller::FDCAN3, third);
     }
     let timers = timers::setup(
         timers::Peripherals {

@@ -46,26 +46,30 @@ pub(crate) unsafe fn write_filter(of: Controller, index: usize, filter: &RangeFi
     unsafe { ((base(of) + index * WORD) as *mut u32).write_volatile(word) }
 }
 
-/// Writes the Tx buffer `index`.
+/// The first of the Tx buffers.
+#[inline(always)]
+pub(crate) const fn tx_buffers(of: Controller) -> *mut u32 {
+    (base(of) + TX_BUFFERS) as *mut u32
+}
+
+/// Writes the Tx buffer `index`, the first one being at `first`.
 ///
 /// # Safety
 ///
-/// The controllers' clock must be on, `index` below 3, no transmission of that buffer
-/// may be requested, and nobody else may write Tx buffers meanwhile.
+/// `first` must be from [`tx_buffers`], the controllers' clock on, `index` below 3, no
+/// transmission of that buffer may be requested, and nobody else may write Tx buffers
+/// meanwhile.
 #[inline(always)]
-pub(crate) unsafe fn write_tx(of: Controller, index: usize, element: &Element) {
-    let address = (base(of) + TX_BUFFERS + index * ELEMENT_WORDS * WORD) as *mut u32;
+pub(crate) unsafe fn write_tx(first: *mut u32, index: usize, element: &Element) {
+    let address = first.wrapping_add(index * ELEMENT_WORDS);
     let words = element.words();
     // SAFETY: in the message RAM by the caller's promise on `index`;
     // aligned.
     unsafe {
         address.write_volatile(words[0]);
         address.add(1).write_volatile(words[1]);
-        // A frame without data needs no data words: SYNC takes this way.
-        if element.has_data() {
-            address.add(2).write_volatile(words[2]);
-            address.add(3).write_volatile(words[3]);
-        }
+        address.add(2).write_volatile(words[2]);
+        address.add(3).write_volatile(words[3]);
     }
 }
 

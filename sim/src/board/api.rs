@@ -157,10 +157,23 @@ impl Board {
     pub fn hang_irq(&mut self, irq: u8) {
         /// Interrupt clear-enable registers of the NVIC (ARMv7-M, B3.4.5).
         const ICER: u32 = 0xE000_E180;
+        self.write_nvic(ICER, irq);
+    }
+
+    /// The task of interrupt `irq` hangs no longer: it is taken again.
+    pub fn resume_irq(&mut self, irq: u8) {
+        /// Interrupt set-enable registers of the NVIC (ARMv7-M, B3.4.4).
+        const ISER: u32 = 0xE000_E100;
+        self.write_nvic(ISER, irq);
+        self.shared.dirty.store(true, Ordering::Relaxed);
+    }
+
+    /// Writes the bit of an interrupt in one of the NVIC's sets of registers.
+    fn write_nvic(&mut self, first: u32, irq: u8) {
         const BITS: u32 = 32;
         let (word, bit) = (u32::from(irq) / BITS, u32::from(irq) % BITS);
         self.core.with_sys(|sys| {
-            sys.write_word(ICER + word * 4, 1 << bit);
+            sys.write_word(first + word * 4, 1 << bit);
         });
     }
 

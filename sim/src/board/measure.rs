@@ -8,7 +8,7 @@ use rsemu::cpu::arm::v7m::{ArmV7m, Regs};
 use super::flash::FlashFigures;
 use super::irq::IrqRouter;
 use super::rcc::ResetCause;
-use super::soc::irq_name;
+use super::soc::{TIM2_IRQ, irq_name};
 use super::sync_probe::SyncFigures;
 use crate::time::Time;
 
@@ -64,7 +64,8 @@ pub struct BoardStats {
     /// Longest section with PRIMASK or FAULTMASK set before the first
     /// interrupt.
     pub startup_irq_off_cycles: u64,
-    /// Longest section in which BASEPRI held back TIM2's interrupt.
+    /// Longest section in which BASEPRI held back TIM2's interrupt: a frame handed to
+    /// a controller, under the ceiling of the SYNC task.
     pub sync_masked_max_cycles: u64,
     /// Where that section ended.
     pub sync_masked_max_pc: u32,
@@ -228,7 +229,10 @@ impl Measure {
                 }
             }
         }
-        let holds = regs.basepri != 0 && regs.basepri <= sync_priority;
+        // Within its own task there is nobody to be held back.
+        let holds = regs.basepri != 0
+            && regs.basepri <= sync_priority
+            && exception != FIRST_IRQ + u32::from(TIM2_IRQ);
         if (holds || self.sync_masked.since.is_some())
             && let Some((length, false)) =
                 self.sync_masked.follow(holds, cycle, !self.any_irq_taken)

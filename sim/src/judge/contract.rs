@@ -17,7 +17,7 @@ const ONE_CYCLE: u64 = 1;
 /// The fastest that any axis is ever commanded, rpm: the firmware's limit.
 const FASTEST_RPM: u64 = 2200;
 /// Deceleration of the fastest axis in a stop by the master, rpm/s.
-const STOP_RPM_PER_S: u64 = 3000;
+pub(super) const STOP_RPM_PER_S: u64 = 3000;
 /// 6085h, rpm/s.
 const QUICK_STOP_RPM_PER_S: u64 = 10_000;
 /// From the end of a ramp until the shaft is below the speed that counts as

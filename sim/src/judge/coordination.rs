@@ -47,7 +47,7 @@ pub struct Span {
 
 /// What an RPDO sets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Target {
+pub(super) enum Target {
     Position(i64),
     Velocity(i64),
     Torque(i64),
@@ -83,7 +83,7 @@ fn on_bus(wire: &[WireRecord], network: &Network) -> Vec<Span> {
             continue;
         };
         if id != SYNC {
-            if let Some((axis, target)) = target(frame, id, network) {
+            if let Some((axis, target)) = set_by(frame, id, network) {
                 axes[axis].next = Some(target);
             }
             continue;
@@ -129,7 +129,7 @@ impl Axis {
 }
 
 /// Whose set value the frame carries, and which.
-fn target(frame: &WireFrame, id: u16, network: &Network) -> Option<(usize, Target)> {
+pub(super) fn set_by(frame: &WireFrame, id: u16, network: &Network) -> Option<(usize, Target)> {
     let above = id.checked_sub(RPDO1)?;
     let number = above / RPDO_STEP;
     if number >= RPDOS {

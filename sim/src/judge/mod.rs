@@ -8,6 +8,7 @@ pub mod contract;
 pub mod coordination;
 pub mod grid;
 pub mod lss;
+pub mod reaction;
 pub mod realtime;
 pub mod sdo;
 pub mod skew;

@@ -55,6 +55,32 @@ pub fn judge(records: &[WireRecord], traffic: &Traffic, board: PortId) -> RealTi
 /// The place of each SYNC in the records, and how much later it left than the
 /// earliest did, against a grid through those that were on time.
 fn lateness(records: &[WireRecord], cycle: Time) -> Vec<(usize, f64)> {
+    let (places, points) = numbered(records, cycle);
+    let late = match grid_of(&points) {
+        Some(grid) => lateness_on(&grid, &points),
+        None => vec![0.0; points.len()],
+    };
+    places.into_iter().zip(late).collect()
+}
+
+/// The greatest distance between the SYNCs of all buses, each from one grid that they
+/// have in common: what the board knows of their starts, counted from its tick.
+pub fn jitter_of_all(buses: &[&[WireRecord]], cycle: Time) -> f64 {
+    let first = buses.first().copied().unwrap_or_default();
+    let Some(grid) = grid_of(&numbered(first, cycle).1) else {
+        return 0.0;
+    };
+    let syncs = buses.iter().flat_map(|records| records.iter());
+    let syncs = syncs.filter(|record| is_sync(record));
+    let late = syncs.map(|record| {
+        let us = record.sof.as_us_f64() - grid.origin;
+        us - (us / grid.period).round() * grid.period
+    });
+    peak_to_peak(&late.collect::<Vec<f64>>())
+}
+
+/// The places of the SYNCs in the records, and of each its number and its moment.
+fn numbered(records: &[WireRecord], cycle: Time) -> (Vec<usize>, Vec<(u64, f64)>) {
     let cycle_us = cycle.as_us_f64();
     let syncs = records.iter().enumerate();
     let syncs = syncs.filter(|(_, record)| is_sync(record));
@@ -68,28 +94,35 @@ fn lateness(records: &[WireRecord], cycle: Time) -> Vec<(usize, f64)> {
         points.push((n, us));
         places.push(place);
     }
-    let mut on_time = points.clone();
-    let mut late = vec![0.0; points.len()];
-    for _ in 0..PASSES {
-        let Some(grid) = Grid::fit(&on_time) else {
-            break;
-        };
-        let residuals = grid.residuals(&points);
-        let earliest = residuals.iter().copied().fold(f64::INFINITY, f64::min);
-        late = residuals.iter().map(|us| us - earliest).collect();
+    (places, points)
+}
+
+/// How much later than the earliest each point is.
+fn lateness_on(grid: &Grid, points: &[(u64, f64)]) -> Vec<f64> {
+    let residuals = grid.residuals(points);
+    let earliest = residuals.iter().copied().fold(f64::INFINITY, f64::min);
+    residuals.iter().map(|us| us - earliest).collect()
+}
+
+/// The grid through those that were on time.
+fn grid_of(points: &[(u64, f64)]) -> Option<Grid> {
+    let mut grid = Grid::fit(points)?;
+    for _ in 1..PASSES {
+        let late = lateness_on(&grid, points);
         // The half that is least late: whatever disturbs, it is not among them.
         let mut sorted = late.clone();
         sorted.sort_by(f64::total_cmp);
         let limit = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
         let limit = limit.max(ON_TIME_US);
-        on_time = points
+        let on_time: Vec<_> = points
             .iter()
             .zip(&late)
             .filter(|(_, us)| **us <= limit)
             .map(|(point, _)| *point)
             .collect();
+        grid = Grid::fit(&on_time)?;
     }
-    places.into_iter().zip(late).collect()
+    Some(grid)
 }
 
 fn histogram(late: &[f64]) -> Vec<usize> {
@@ -236,6 +269,22 @@ mod tests {
         let figures = judge(&records, &traffic(), BOARD);
         assert!((figures.jitter_pp_us - 130.0).abs() < 0.01, "{figures:?}");
         assert_eq!(figures.unexplained, 40);
+    }
+
+    #[test]
+    fn buses_have_one_grid() {
+        let shifted = |us: u64| -> Vec<WireRecord> {
+            (0..100)
+                .map(|n| record(1000 + us + 2000 * n, 0x080, BOARD))
+                .collect()
+        };
+        let cycle = Time::from_us(2000);
+        let (one, mut other) = (shifted(0), shifted(1));
+        let all = |other: &[WireRecord]| jitter_of_all(&[&one, other], cycle);
+        assert!((all(&other) - 1.0).abs() < 1e-6);
+        other[50] = record(1000 + 2000 * 50 + 41, 0x080, BOARD);
+        assert!((all(&other) - 41.0).abs() < 1e-6);
+        assert_eq!(jitter_of_all(&[], cycle), 0.0);
     }
 
     #[test]

@@ -30,6 +30,7 @@ impl World<'_> {
             }
             Stimulus::Reset(false) | Stimulus::Power(true) => self.board.release_reset(),
             Stimulus::Hang { irq } => self.board.hang_irq(irq),
+            Stimulus::Resume { irq } => self.board.resume_irq(irq),
             Stimulus::Spin { irq } => self.board.spin_irq(irq),
             Stimulus::DelayIrq { irq, max_cycles } => {
                 self.board.delay_irq(irq, max_cycles, self.scenario.seed);

@@ -22,6 +22,11 @@ pub enum Stimulus {
         /// Its number.
         irq: u8,
     },
+    /// An interrupt that was not taken any more is taken again.
+    Resume {
+        /// Its number.
+        irq: u8,
+    },
     /// The next task that an interrupt of the board starts never ends, until the
     /// next reset: what has a lower priority waits for ever.
     Spin {
@@ -58,6 +63,7 @@ impl Stimulus {
             Stimulus::Button(_)
             | Stimulus::Reset(false)
             | Stimulus::Power(true)
+            | Stimulus::Resume { .. }
             | Stimulus::DelayIrq { .. } => return None,
             Stimulus::Reset(true) => "board reset".into(),
             Stimulus::Power(false) => "board without supply".into(),

@@ -1,14 +1,14 @@
 //! What error control tells of a node, and what follows (CiA 302-2, "Check node
 //! state", "Start error control service", "Error handler").
 
-use super::super::event::{Action, Event};
+use super::super::event::Action;
 use super::super::failure::{BootResult, Cause, Failure, Status};
 use super::super::settings::Assignment;
 use super::state::{
     AwaitBootUp, AwaitErrorControl, AwaitReset, AwaitState, Configure, Lost, Operational, Ready,
     Starting, State,
 };
-use super::{ATTEMPT, NodeBoot, deadline};
+use super::{ATTEMPT, NodeBoot, Step};
 use crate::frame::Frame;
 use crate::nmt::{self, Command, ErrorControl, Guard, Guardian};
 use crate::time::{Duration, Instant};
@@ -23,12 +23,11 @@ impl NodeBoot {
     /// The node reported its NMT state: a boot-up frame, a heartbeat or the
     /// answer to node guarding (CiA 301, 7.2.8.3.2).
     #[inline(never)]
-    pub(in super::super) fn on_error_control(&mut self, frame: &Frame, now: Instant) {
+    pub(in super::super) fn on_error_control(&mut self, frame: &Frame) {
         let Some(ErrorControl { state, .. }) = ErrorControl::decode(frame) else {
             return;
         };
-        self.now = now;
-        let counts = self.guardian.on_frame(frame, now).is_some();
+        let counts = self.guardian.on_frame(frame, self.now).is_some();
         if state == nmt::State::Initialising {
             return self.on_boot_up();
         }
@@ -41,9 +40,9 @@ impl NodeBoot {
             State::AwaitState(_) if operational => {
                 self.enter(State::Operational(Operational));
                 if core::mem::take(&mut self.lost) {
-                    self.report(Event::NodeBack(self.node.id));
+                    self.tell(Step::Back);
                 }
-                self.done(BootResult::LeftRunning, Event::LeftRunning(self.node.id));
+                self.done(BootResult::LeftRunning, Step::LeftRunning);
             }
             State::AwaitState(_) => self.reset(false),
             State::AwaitErrorControl(_) => self.ready(),
@@ -88,7 +87,7 @@ impl NodeBoot {
         self.client.reset();
         self.tries = 0;
         self.fresh = true;
-        self.report(Event::BootUp(self.node.id));
+        self.tell(Step::BootUp);
         if !self.is(Assignment::MAY_START) {
             return self.await_error_control();
         }
@@ -129,12 +128,12 @@ impl NodeBoot {
         self.lost = true;
         self.result = BootResult::Pending;
         self.enter(State::Lost(Lost { booted }));
-        self.report(Event::NodeLost(self.node.id));
+        self.tell(Step::Lost);
         true
     }
 
     /// A lost node is booted again (CiA 302-2, "Error handler").
-    pub(in super::super) fn recover(&mut self, boot_time: Duration, now: Instant) {
+    pub(in super::super) fn recover(&mut self) {
         let booted = match self.state {
             State::Lost(Lost { booted }) => booted,
             // It was put into the list meanwhile.
@@ -143,26 +142,20 @@ impl NodeBoot {
         };
         let may_start = self.is(Assignment::MAY_START);
         if !booted || !may_start {
-            return self.begin(boot_time, may_start, now);
+            return self.begin(may_start);
         }
-        self.now = now;
         self.held = false;
-        self.boot_deadline = deadline(boot_time, now);
+        self.begin_boot_time();
         self.restarted();
     }
 
     /// Sends a reset that was requested, and boots the node again.
-    pub(in super::super) fn reset_by_request(
-        &mut self,
-        command: Command,
-        boot_time: Duration,
-        now: Instant,
-    ) {
+    pub(in super::super) fn reset_by_request(&mut self, command: Command) {
         let was_up = self.is_up();
-        self.begin(boot_time, false, now);
+        self.begin(false);
         if was_up {
             self.lost = true;
-            self.report(Event::NodeLost(self.node.id));
+            self.tell(Step::Lost);
         }
         self.send(command);
     }
@@ -220,29 +213,24 @@ impl NodeBoot {
 
     fn ready(&mut self) {
         self.enter(State::Ready(Ready));
-        self.done(BootResult::Booted, Event::Ready(self.node.id));
+        self.done(BootResult::Booted, Step::Ready);
     }
 
-    fn done(&mut self, result: BootResult, event: Event) {
+    fn done(&mut self, result: BootResult, step: Step) {
         self.gave_up = false;
         self.result = result;
-        self.report(event);
+        self.tell(step);
     }
 
     fn operational(&mut self) {
         self.enter(State::Operational(Operational));
         self.restarts = 0;
         let back = core::mem::take(&mut self.lost);
-        self.report(if back {
-            Event::NodeBack(self.node.id)
-        } else {
-            Event::Operational(self.node.id)
-        });
+        self.tell(if back { Step::Back } else { Step::Operational });
     }
 
     /// NMT start goes, or went by broadcast, to the node.
-    pub(in super::super) fn start(&mut self, alone: bool, now: Instant) {
-        self.now = now;
+    pub(in super::super) fn start(&mut self, alone: bool) {
         if alone {
             self.send(Command::Start);
         }

@@ -46,10 +46,12 @@ pub(super) struct NodeBoot {
     planned: u16,
     node: &'static Node,
     settings: NodeSettings,
+    /// 1F89h; zero: for ever.
+    boot_time: Duration,
     state: State,
     /// When time alone leads out of the state.
     until: Instant,
-    /// The time of what is being done: it is wanted in many places.
+    /// The time of what is being done, as the network has told it.
     now: Instant,
     network: &'static Network,
     result: BootResult,
@@ -61,16 +63,59 @@ pub(super) struct NodeBoot {
     outbox: Deque<Action, OUTBOX>,
 }
 
+/// A step of which there is no more to tell than whose it is.
+#[derive(Clone, Copy)]
+enum Step {
+    BootUp,
+    Identified,
+    Configured,
+    Ready,
+    LeftRunning,
+    NotListed,
+    Operational,
+    Lost,
+    Back,
+}
+
+/// What the network looks for in its nodes.
+#[derive(Clone, Copy)]
+pub(super) struct Trait(u16);
+
+impl Trait {
+    /// It did not boot and is to be looked for by its serial number.
+    pub(super) const MISSING: Trait = Trait(1 << 0);
+    /// NMT start was sent.
+    pub(super) const STARTING: Trait = Trait(1 << 1);
+    pub(super) const OPERATIONAL: Trait = Trait(1 << 2);
+    pub(super) const KEPT_ALIVE: Trait = Trait(1 << 3);
+    /// In the list, failed, and not booted since.
+    pub(super) const GIVEN_UP: Trait = Trait(1 << 4);
+    /// In the list, and neither booted nor given up.
+    pub(super) const UNSETTLED: Trait = Trait(1 << 5);
+    /// Not waiting to be started, or not allowed to be.
+    pub(super) const NOT_STARTABLE: Trait = Trait(1 << 6);
+    /// Mandatory, and no longer what it should be.
+    pub(super) const MANDATORY_LOST: Trait = Trait(1 << 7);
+    /// Mandatory and given up.
+    pub(super) const MANDATORY_FAILED: Trait = Trait(1 << 8);
+    /// Mandatory and not booted.
+    pub(super) const MANDATORY_DOWN: Trait = Trait(1 << 9);
+    /// Mandatory and not all that the network wants of it.
+    pub(super) const MANDATORY_INCOMPLETE: Trait = Trait(1 << 10);
+}
+
 impl NodeBoot {
     pub(super) fn new(
         network: &'static Network,
         node: &'static Node,
         settings: NodeSettings,
+        boot_time: Duration,
     ) -> NodeBoot {
         NodeBoot {
             network,
             node,
             settings,
+            boot_time,
             client: Client::new(node.id, node.sdo_timeout),
             state: State::Idle(Idle),
             until: Instant::NEVER,
@@ -90,8 +135,14 @@ impl NodeBoot {
         }
     }
 
-    pub(super) const fn set_settings(&mut self, settings: NodeSettings) {
+    pub(super) const fn set_settings(&mut self, settings: NodeSettings, boot_time: Duration) {
         self.settings = settings;
+        self.boot_time = boot_time;
+    }
+
+    /// What follows is done at `now`.
+    pub(super) const fn set_now(&mut self, now: Instant) {
+        self.now = now;
     }
 
     pub(super) const fn node(&self) -> &'static Node {
@@ -114,26 +165,13 @@ impl NodeBoot {
         )
     }
 
-    pub(super) const fn is_settled(&self) -> bool {
-        self.is_up() || self.gave_up || !self.is(0)
-    }
-
     pub(super) const fn has_given_up(&self) -> bool {
         self.gave_up
     }
 
-    pub(super) const fn is_starting(&self) -> bool {
-        matches!(self.state, State::Starting(_))
-    }
-
-    /// Waiting to be started, and allowed to be.
-    pub(super) const fn is_startable(&self) -> bool {
-        matches!(self.state, State::Ready(_)) && self.is(Assignment::MAY_START) && !self.held
-    }
-
     /// All that the network wants of it: operational, or booted if it is not to
     /// be started.
-    pub(super) const fn is_complete(&self) -> bool {
+    const fn is_complete(&self) -> bool {
         match self.state {
             State::Operational(_) => true,
             State::Ready(_) => !self.is(Assignment::MAY_START),
@@ -141,17 +179,46 @@ impl NodeBoot {
         }
     }
 
-    pub(super) const fn is_operational(&self) -> bool {
-        matches!(self.state, State::Operational(_))
-    }
-
-    pub(super) const fn is_lost(&self) -> bool {
-        matches!(self.state, State::Lost(_))
-    }
-
-    /// It did not boot and is to be looked for by its serial number.
-    pub(super) const fn is_missing(&self) -> bool {
-        matches!(self.state, State::Missing(_))
+    /// Whether it has that trait. All are found out in one place: flash is scarcer
+    /// than time.
+    #[inline(never)]
+    pub(super) const fn has(&self, one: Trait) -> bool {
+        let (up, listed) = (self.is_up(), self.is(0));
+        let startable =
+            matches!(self.state, State::Ready(_)) && self.is(Assignment::MAY_START) && !self.held;
+        let mut traits = match self.state {
+            State::Missing(_) => Trait::MISSING.0,
+            State::Starting(_) => Trait::STARTING.0,
+            State::Operational(_) => Trait::OPERATIONAL.0,
+            _ => 0,
+        };
+        if self.is(Assignment::KEEP_ALIVE) {
+            traits |= Trait::KEPT_ALIVE.0;
+        }
+        if self.gave_up && listed {
+            traits |= Trait::GIVEN_UP.0;
+        }
+        if !up && !self.gave_up && listed {
+            traits |= Trait::UNSETTLED.0;
+        }
+        if !startable {
+            traits |= Trait::NOT_STARTABLE.0;
+        }
+        if self.is(Assignment::MANDATORY) {
+            if matches!(self.state, State::Lost(_)) {
+                traits |= Trait::MANDATORY_LOST.0;
+            }
+            if self.gave_up {
+                traits |= Trait::MANDATORY_FAILED.0;
+            }
+            if !up {
+                traits |= Trait::MANDATORY_DOWN.0;
+            }
+            if !self.is_complete() {
+                traits |= Trait::MANDATORY_INCOMPLETE.0;
+            }
+        }
+        traits & one.0 != 0
     }
 
     /// If it does not boot, it is looked for before it is given up, should the
@@ -161,9 +228,8 @@ impl NodeBoot {
     }
 
     /// Nobody is looked for any more. Whether it is given up for that.
-    pub(super) fn not_found(&mut self, now: Instant) -> bool {
-        self.now = now;
-        let missing = self.is_missing();
+    pub(super) fn not_found(&mut self) -> bool {
+        let missing = self.has(Trait::MISSING);
         if missing {
             self.fail(Status::B, Cause::NoBootUp);
         }
@@ -172,34 +238,32 @@ impl NodeBoot {
 
     /// It was reset, or given its node-ID: it boots.
     #[inline(never)]
-    pub(super) fn await_boot_up(&mut self, boot_time: Duration, now: Instant) {
-        self.now = now;
-        self.boot_deadline = deadline(boot_time, now);
+    pub(super) fn await_boot_up(&mut self) {
+        self.begin_boot_time();
         self.enter_until(State::AwaitBootUp(AwaitBootUp), self.boot_end());
     }
 
     /// The boot-up begins. `reset`: the node is to be reset by itself, unless it
     /// is to be kept alive.
-    pub(super) fn begin(&mut self, boot_time: Duration, reset: bool, now: Instant) {
+    pub(super) fn begin(&mut self, reset: bool) {
         self.halt();
         self.result = BootResult::Pending;
         self.gave_up = false;
         self.held = false;
         self.search = false;
         self.restarts = 0;
-        self.boot_deadline = deadline(boot_time, now);
         if !self.is(0) {
             self.result = BootResult::Failed(Failure {
                 status: Status::A,
                 cause: Cause::NotListed,
             });
-            return self.report(Event::NotListed(self.node.id));
+            return self.tell(Step::NotListed);
         }
         let keep_alive = self.is(Assignment::KEEP_ALIVE);
         if reset && !keep_alive {
             self.send(Command::ResetCommunication);
         }
-        self.await_boot_up(boot_time, now);
+        self.await_boot_up();
         if !self.is(Assignment::MAY_START) {
             self.guard();
             let end = self.boot_end() + self.patience();
@@ -218,12 +282,11 @@ impl NodeBoot {
     }
 
     /// The next thing to do, if there is one now.
-    pub(super) fn poll(&mut self, now: Instant) -> Option<Action> {
+    pub(super) fn poll(&mut self) -> Option<Action> {
         if let Some(action) = self.outbox.pop_front() {
             return Some(action);
         }
-        self.now = now;
-        let progress = self.client.poll(now);
+        let progress = self.client.poll(self.now);
         self.on_progress(progress);
         self.advance();
         self.ask_for_state();
@@ -267,6 +330,14 @@ impl NodeBoot {
         self.fail(status, cause);
     }
 
+    /// The boot time begins; zero lasts for ever.
+    fn begin_boot_time(&mut self) {
+        self.boot_deadline = match self.boot_time {
+            Duration::ZERO => Instant::NEVER,
+            time => self.now + time,
+        };
+    }
+
     fn boot_time_is_over(&self) -> bool {
         self.now >= self.boot_deadline
     }
@@ -280,6 +351,7 @@ impl NodeBoot {
     }
 
     /// A state that time alone does not lead out of.
+    #[inline(never)]
     fn enter(&mut self, state: State) {
         self.enter_until(state, Instant::NEVER);
     }
@@ -323,6 +395,23 @@ impl NodeBoot {
         }
     }
 
+    /// Tells of a step that is done.
+    #[inline(never)]
+    fn tell(&mut self, step: Step) {
+        let node = self.node.id;
+        self.report(match step {
+            Step::BootUp => Event::BootUp(node),
+            Step::Identified => Event::Identified(node),
+            Step::Configured => Event::Configured(node),
+            Step::Ready => Event::Ready(node),
+            Step::LeftRunning => Event::LeftRunning(node),
+            Step::NotListed => Event::NotListed(node),
+            Step::Operational => Event::Operational(node),
+            Step::Lost => Event::NodeLost(node),
+            Step::Back => Event::NodeBack(node),
+        });
+    }
+
     #[inline(never)]
     fn report(&mut self, event: Event) {
         self.push(Action::Report(event));
@@ -335,13 +424,5 @@ impl NodeBoot {
         // The outbox holds what one stimulus can cause; it is emptied before
         // the next one.
         let _ = self.outbox.push_back(action);
-    }
-}
-
-/// The end of a boot time; zero lasts for ever.
-fn deadline(boot_time: Duration, now: Instant) -> Instant {
-    match boot_time {
-        Duration::ZERO => Instant::NEVER,
-        time => now + time,
     }
 }

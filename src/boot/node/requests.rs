@@ -5,13 +5,12 @@ use super::super::event::{Action, Event};
 use super::super::failure::{Cause, Status};
 use super::super::settings::Assignment;
 use super::state::{Configure, Identify, Restore, Retry, State, Verify};
-use super::{ATTEMPT, NodeBoot};
+use super::{ATTEMPT, NodeBoot, Step};
 use crate::frame::Frame;
 use crate::id::Address;
 use crate::network::{self, ConfigWrite};
 use crate::objects;
 use crate::sdo::{Progress, SdoError};
-use crate::time::Instant;
 
 /// Configuration writes between two progress reports.
 const REPORT_EVERY: u16 = 16;
@@ -32,9 +31,8 @@ const IDENTITY: [(Address, Status); 5] = [
 
 impl NodeBoot {
     /// A frame from the node's SDO server.
-    pub(in super::super) fn on_sdo(&mut self, frame: &Frame, now: Instant) {
-        self.now = now;
-        let progress = self.client.on_frame(frame, now);
+    pub(in super::super) fn on_sdo(&mut self, frame: &Frame) {
+        let progress = self.client.on_frame(frame, self.now);
         self.on_progress(progress);
     }
 
@@ -59,7 +57,7 @@ impl NodeBoot {
                 }
                 Some((at, _)) => self.read(*at),
                 None => {
-                    self.report(Event::Identified(self.node.id));
+                    self.tell(Step::Identified);
                     if self.is(Assignment::KEEP_ALIVE) && !self.fresh {
                         self.await_state();
                     } else {
@@ -71,7 +69,7 @@ impl NodeBoot {
             State::Verify(Verify { item }) => match SIGNATURE.get(usize::from(item)) {
                 Some(at) => self.read(*at),
                 None => {
-                    self.report(Event::Configured(self.node.id));
+                    self.tell(Step::Configured);
                     self.await_error_control();
                 }
             },
@@ -82,7 +80,7 @@ impl NodeBoot {
             State::Configure(Configure { done }) => match self.planned(done) {
                 Some(write) => self.write(write),
                 None => {
-                    self.report(Event::Configured(self.node.id));
+                    self.tell(Step::Configured);
                     self.await_error_control();
                 }
             },
@@ -256,13 +254,6 @@ impl NodeBoot {
 
     /// What an entry of [`IDENTITY`] must be.
     fn expected(&self, item: u8) -> Option<u32> {
-        let identity = &self.node.identity;
-        match item {
-            0 => identity.device_type,
-            1 => identity.vendor,
-            2 => identity.product,
-            3 => identity.revision,
-            _ => identity.serial,
-        }
+        self.node.identity.number(item)
     }
 }

@@ -107,6 +107,7 @@ impl<const N: usize> Settings<N> {
     }
 
     /// 1012h.
+    #[inline(never)]
     pub fn time_cob_id(&self) -> TimeCobId {
         TimeCobId(self.get(Setting::TimeCobId))
     }

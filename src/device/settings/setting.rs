@@ -1,6 +1,6 @@
 //! The entries that can be written and saved.
 
-use super::super::table::{Item, Row, TABLE};
+use super::super::table::{Row, TABLE};
 use crate::id::Address;
 use crate::network::Network;
 use crate::od::DataType;
@@ -86,6 +86,50 @@ impl Setting {
         }
     }
 
+    /// Which one it is, whatever the node.
+    pub(in crate::device) const fn number(self) -> u8 {
+        match self {
+            Setting::SyncCobId => 0,
+            Setting::SyncPeriod => 1,
+            Setting::SyncWindow => 2,
+            Setting::TimeCobId => 3,
+            Setting::EmcyCobId => 4,
+            Setting::EmcyInhibit => 5,
+            Setting::ConsumerHeartbeat(_) => 6,
+            Setting::ProducerHeartbeat => 7,
+            Setting::SyncOverflow => 8,
+            Setting::ConfigurationDate => 9,
+            Setting::ConfigurationTime => 10,
+            Setting::ErrorBehaviour => 11,
+            Setting::Startup => 12,
+            Setting::Assignment(_) => 13,
+            Setting::BootTime => 14,
+            Setting::TimePeriod => 15,
+        }
+    }
+
+    /// The setting with this number, of this node if it is one of a node.
+    pub(in crate::device) const fn numbered(number: u8, node: u8) -> Setting {
+        match number {
+            0 => Setting::SyncCobId,
+            1 => Setting::SyncPeriod,
+            2 => Setting::SyncWindow,
+            3 => Setting::TimeCobId,
+            4 => Setting::EmcyCobId,
+            5 => Setting::EmcyInhibit,
+            6 => Setting::ConsumerHeartbeat(node),
+            7 => Setting::ProducerHeartbeat,
+            8 => Setting::SyncOverflow,
+            9 => Setting::ConfigurationDate,
+            10 => Setting::ConfigurationTime,
+            11 => Setting::ErrorBehaviour,
+            12 => Setting::Startup,
+            13 => Setting::Assignment(node),
+            14 => Setting::BootTime,
+            _ => Setting::TimePeriod,
+        }
+    }
+
     /// Type of the entry.
     pub fn data_type(self) -> DataType {
         self.row().map_or(DataType::Unsigned32, |row| row.data_type)
@@ -111,15 +155,9 @@ impl Setting {
         Some(Address::new(row.first, sub))
     }
 
-    /// Its line in the list of objects: of the settings of a node, that names the
-    /// first.
+    /// Its line in the list of objects.
     fn row(self) -> Option<&'static Row> {
-        let named = match self {
-            Setting::ConsumerHeartbeat(_) => Setting::ConsumerHeartbeat(0),
-            Setting::Assignment(_) => Setting::Assignment(0),
-            own => own,
-        };
-        TABLE.iter().find(|row| row.item == Item::Setting(named))
+        TABLE.iter().find(|row| row.is_of(self))
     }
 
     /// Those that are saved, in an order in which they can be loaded.
@@ -137,5 +175,22 @@ impl Setting {
         }
         let n = n - nodes;
         (n < nodes).then_some(Setting::Assignment(n))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::network::sample::SIX_EPOS4;
+
+    #[test]
+    fn every_setting_has_its_number_and_its_row() {
+        for number in 0..16 {
+            let setting = Setting::numbered(number, 3);
+            assert_eq!(setting.number(), number);
+            assert!(setting.address(&SIX_EPOS4).is_some(), "{setting:?}");
+        }
+        assert_eq!(Setting::numbered(6, 3), Setting::ConsumerHeartbeat(3));
+        assert_eq!(Setting::numbered(13, 3), Setting::Assignment(3));
     }
 }

@@ -166,6 +166,23 @@ impl Axis {
         }
     }
 
+    /// Goes one cycle on: to that of the number `count`, in which an announced path
+    /// begins if it is `cut`.
+    #[inline]
+    pub(super) fn go_on(&mut self, count: u32, cut: bool) {
+        self.count = count;
+        if cut {
+            self.path.cut();
+            self.over = 0;
+        }
+        // At rest all samples are the same.
+        let over = self.path.is_over();
+        if !over || self.over < AHEAD {
+            self.look(AHEAD);
+        }
+        self.over = if over { self.over.saturating_add(1) } else { 0 };
+    }
+
     /// Takes in this cycle's feedback and goes one cycle on; returns the state of
     /// the drive if it is another one than last reported.
     #[inline(never)]
@@ -177,17 +194,7 @@ impl Axis {
         limits: &AxisConfig,
         config: &GroupConfig<N>,
     ) -> Option<State> {
-        self.count = count;
-        if cut {
-            self.path.cut();
-            self.over = 0;
-        }
-        // At rest all samples are the same.
-        let over = self.path.is_over();
-        if !over || self.over < AHEAD {
-            self.go_on(AHEAD);
-        }
-        self.over = if over { self.over.saturating_add(1) } else { 0 };
+        self.go_on(count, cut);
         let mut seen = self.seen & LASTING;
         if self.over >= AHEAD {
             seen |= ENDED;
@@ -243,7 +250,7 @@ impl Axis {
     }
 
     /// The next point of the path, as that of so many cycles ahead.
-    fn go_on(&mut self, ahead: u32) {
+    fn look(&mut self, ahead: u32) {
         self.path.go_on();
         let sample = self.path.sample();
         if let Some(place) = self.samples.get_mut(place(self.count, ahead)) {
@@ -328,8 +335,8 @@ impl Axis {
         }
         self.path.restart(&at);
         self.path.push(&end, false);
-        self.go_on(END);
-        self.go_on(AHEAD);
+        self.look(END);
+        self.look(AHEAD);
         slope
     }
 

@@ -99,10 +99,10 @@ impl DriveLed {
         ControlWord(begun).with_halt(halt).0
     }
 
-    /// Takes in a statusword, if a fresh one came. `false`: it reports that homing
+    /// Takes in a statusword, if a fresh one came, `passed` cycles later. `false`: it reports that homing
     /// failed.
-    pub(super) fn hear(&mut self, mode: Mode, status: Option<StatusWord>) -> bool {
-        self.waited = self.waited.saturating_add(1);
+    pub(super) fn hear(&mut self, mode: Mode, status: Option<StatusWord>, passed: u32) -> bool {
+        self.waited = self.waited.saturating_add(passed);
         let Some(status) = status else {
             return true;
         };

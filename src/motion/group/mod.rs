@@ -23,7 +23,7 @@ use super::mode::Mode;
 use super::path::{Knot, Point};
 use super::{AxisConfig, FaultCause, GroupConfig, GroupEvent, GroupState, fixed};
 use crate::cia402::{Command, ControlWord, Goal, State};
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 use heapless::Deque;
 
 /// Events kept until they are taken: enough for the busiest step, in which every
@@ -32,6 +32,9 @@ const EVENTS: usize = 24;
 /// Cycles in which every drive has the target of a new mode before the mode is
 /// written.
 const TARGET_SETTLED: u32 = 3;
+/// So many missed cycles the references are followed up in one step. After more the
+/// group is stopped anyway.
+const CAUGHT_UP_MAX: u32 = 8;
 
 /// What a drive reported in this cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -74,8 +77,18 @@ pub struct Inputs {
     /// Level: bit n leaves out axis n, whose optional node is not there. One that
     /// goes in motion is a fault; one that comes waits for standby.
     pub absent: u32,
-    /// Edge: a fault seen elsewhere, with the axis counted from 0.
+    /// Edge: a fault seen elsewhere, with the axis counted from 0; a number that no
+    /// axis has: of all.
     pub fault: Option<(usize, FaultCause)>,
+    /// Cycles since the last step: more than one if some were missed, for the axes went
+    /// on meanwhile. 0 counts as 1.
+    pub passed: u32,
+}
+
+impl Inputs {
+    fn cycles(&self) -> u32 {
+        self.passed.max(1)
+    }
 }
 
 /// One axis, for whoever looks.
@@ -413,13 +426,17 @@ impl<const N: usize> Group<N> {
         out: &mut [AxisCommand; N],
     ) {
         let Some(config) = self.config else { return };
-        self.now += config.cycle;
-        self.since = self.since.saturating_add(1);
-        self.staged = self.staged.saturating_add(1);
-        self.count = self.count.wrapping_add(1);
-        let mut cut = 0;
-        if self.start == self.count {
-            cut = core::mem::take(&mut self.announced);
+        let passed = inputs.cycles();
+        let us = config.cycle.as_micros().saturating_mul(passed);
+        self.now += Duration::from_micros(us);
+        self.since = self.since.saturating_add(passed);
+        self.staged = self.staged.saturating_add(passed);
+        let mut cut = self.count_on();
+        for _ in 1..passed.min(CAUGHT_UP_MAX) {
+            for (n, axis) in self.axes.iter_mut().enumerate() {
+                axis.go_on(self.count, cut & bit(n) != 0);
+            }
+            cut = self.count_on();
         }
         let axes = self.axes.iter_mut().zip(&config.axes).zip(feedback);
         for (n, ((axis, limits), feedback)) in axes.enumerate() {
@@ -461,6 +478,15 @@ impl<const N: usize> Group<N> {
                 }
             }
             axis.command(word.0, led, limits, &config.tuning, out);
+        }
+    }
+
+    /// Another cycle: those whose announced path begins in it.
+    fn count_on(&mut self) -> Axes {
+        self.count = self.count.wrapping_add(1);
+        match self.start == self.count {
+            true => core::mem::take(&mut self.announced),
+            false => 0,
         }
     }
 

@@ -57,7 +57,7 @@ impl<const N: usize> Group<N> {
         let (seen, by_drive) = (axis.seen, axis.seen & BY_DRIVE != 0);
         if by_drive
             && matches!(state, GroupState::Moving | GroupState::Homing)
-            && !axis.led.hear(mode, axis.fresh_status())
+            && !axis.led.hear(mode, axis.fresh_status(), inputs.cycles())
         {
             return Some(FaultCause::DriveError { status });
         }

@@ -1,13 +1,13 @@
 //! Block transfers (CiA 301, 7.2.4.3.8 .. 7.2.4.3.15).
 
-use super::{BLOCK_SIZE, Channel, Failure, Payload, State, Step};
+use super::{BLOCK_SIZE, Channel, Payload, State, Step};
 use crate::sdo::AbortCode;
 use crate::sdo::block::{Receiver, Sender, check_block_size};
-use crate::sdo::command::{BlockSegment, Command, Request, SEGMENT_MAX};
+use crate::sdo::command::{Command, Request};
 
 impl Channel {
     /// CiA 301, 7.2.4.3.9.
-    pub(super) fn block_download_begun(&mut self, command: &Command) -> Result<Step, Failure> {
+    pub(super) fn block_download_begun(&mut self, command: &Command) -> Result<Step, AbortCode> {
         let [block_size, ..] = command.tail();
         let block_size = check_block_size(block_size)?;
         self.sender = Sender::new(block_size, command.has_crc());
@@ -16,15 +16,13 @@ impl Channel {
     }
 
     /// CiA 301, 7.2.4.3.10.
-    pub(super) fn block_acknowledged(&mut self, command: &Command) -> Result<Step, Failure> {
-        Ok(match self.sender.acknowledged(command)? {
-            Some(end) => {
-                self.state = State::BlockDownloadEnd;
-                self.request = end;
-                Step::Send
-            }
-            None => Step::Wait,
-        })
+    pub(super) fn block_acknowledged(&mut self, command: &Command) -> Result<Step, AbortCode> {
+        self.sender.acknowledged(command, &mut self.request)?;
+        if self.sender.is_sending() {
+            return Ok(Step::Wait);
+        }
+        self.state = State::BlockDownloadEnd;
+        Ok(Step::Send)
     }
 
     /// CiA 301, 7.2.4.3.13.
@@ -32,7 +30,7 @@ impl Channel {
         &mut self,
         command: &Command,
         payload: &mut dyn Payload,
-    ) -> Result<Step, Failure> {
+    ) -> Result<Step, AbortCode> {
         self.announced(command.block_data(), payload)?;
         self.receiver = Receiver::new(BLOCK_SIZE, command.has_crc());
         self.state = State::BlockUploadSegments;
@@ -45,9 +43,11 @@ impl Channel {
         &mut self,
         command: &Command,
         payload: &mut dyn Payload,
-    ) -> Result<Step, Failure> {
-        let (data, len) = self.receiver.end(command.end())?;
-        self.take(data.get(..len).unwrap_or(&data), true, payload)?;
+    ) -> Result<Step, AbortCode> {
+        let len = self.receiver.end(command.end())?;
+        let held = *self.receiver.held();
+        let data = held.bytes();
+        self.take(data.get(..len).unwrap_or(data), true, payload)?;
         self.state = State::Finished;
         self.request = Command::bare(Request::BlockUploadEnd.code(), false);
         Ok(Step::Send)
@@ -66,40 +66,39 @@ impl Channel {
         &mut self,
         command: &Command,
         payload: &mut dyn Payload,
-    ) -> Result<Step, Failure> {
-        let segment = BlockSegment::decode(command.0).ok_or(AbortCode::SEQUENCE_NUMBER)?;
-        if let Some(before) = self.receiver.segment(&segment)? {
-            self.take(&before, false, payload)?;
+    ) -> Result<Step, AbortCode> {
+        if command.sequence() == 0 {
+            return Err(AbortCode::SEQUENCE_NUMBER);
         }
-        Ok(match self.receiver.over() {
-            Some(acknowledgement) => {
-                self.request = acknowledgement;
-                Step::Send
-            }
-            None => Step::Wait,
+        let before = &mut Command([0; 8]);
+        self.receiver.segment(command, before)?;
+        if before.sequence() != 0 {
+            self.take(before.bytes(), false, payload)?;
+        }
+        Ok(match self.receiver.over(&mut self.request) {
+            true => Step::Send,
+            false => Step::Wait,
         })
     }
 
     /// At its deadline a block download sends the next segment, and a block
     /// upload acknowledges what it has, once, so that the rest is sent again.
-    pub(super) fn block_poll(&mut self, payload: &mut dyn Payload) -> Result<bool, AbortCode> {
-        let command = match self.state {
-            State::BlockDownloadSegments => match self.sender.next_offset()? {
-                Some(offset) => {
-                    let mut data = [0; SEGMENT_MAX];
-                    let left = self.left(offset);
-                    let len = left.min(SEGMENT_MAX);
-                    payload.read(offset, data.get_mut(..len).unwrap_or(&mut []));
-                    Some(self.sender.segment(data, len, len == left)?)
-                }
-                None => None,
-            },
-            State::BlockUploadSegments => self.receiver.stall(),
-            _ => None,
+    /// [`Step::Ignore`]: there is nothing to be done.
+    pub(super) fn block_poll(&mut self, payload: &mut dyn Payload) -> Result<Step, AbortCode> {
+        let send = match self.state {
+            State::BlockDownloadSegments if self.sender.is_sending() => {
+                self.request = Command([0; 8]);
+                let offset = self.sender.next_offset()?;
+                let (len, last) = self.fill(offset, payload);
+                self.sender.segment(&mut self.request, len, last)?;
+                true
+            }
+            State::BlockUploadSegments => self.receiver.stall(&mut self.request),
+            _ => false,
         };
-        if let Some(command) = command {
-            self.request = command;
-        }
-        Ok(command.is_some())
+        Ok(match send {
+            true => Step::Send,
+            false => Step::Ignore,
+        })
     }
 }

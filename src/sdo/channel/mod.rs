@@ -99,14 +99,18 @@ pub struct Transfer {
 
 /// A channel to the SDO server of one node.
 #[derive(Clone, Debug)]
+// In this order, so that what is used most is near: it takes shorter instructions.
+#[repr(C)]
 pub struct Channel {
-    node: NodeId,
-    timeout: Duration,
-    quarantine: Duration,
+    state: State,
+    /// The toggle bit of the segment, or of the request for one, that is to be
+    /// confirmed.
+    toggle: bool,
     /// The server is not known to refuse block transfers.
     block: bool,
-    /// End of the wait or of the quarantine.
-    deadline: Instant,
+    /// Of the error that is under way.
+    fault: Fault,
+    node: NodeId,
     /// The entry of the transfer under way.
     at: Address,
     /// Bytes of the transfer under way: to be sent, or announced by the
@@ -114,16 +118,16 @@ pub struct Channel {
     size: Option<u32>,
     /// How many of them have been sent or received in order.
     done: u32,
-    state: State,
-    /// The toggle bit of the segment, or of the request for one, that is to be
-    /// confirmed.
-    toggle: bool,
+    /// What the server is to be asked or told next.
+    request: Command,
+    timeout: Duration,
+    quarantine: Duration,
+    /// End of the wait or of the quarantine.
+    deadline: Instant,
     /// This end of a block download.
     sender: Sender,
     /// This end of a block upload.
     receiver: Receiver,
-    /// What the server is to be asked or told next.
-    request: Command,
 }
 
 /// What is awaited.
@@ -155,8 +159,10 @@ enum State {
     BlockUploadSegments,
 }
 
-/// What an answer comes to.
+/// What an answer comes to. As wide as an abort code, so that either comes back in
+/// registers.
 #[derive(Clone, Copy)]
+#[repr(u32)]
 enum Step {
     /// Wait on.
     Wait,
@@ -167,26 +173,17 @@ enum Step {
     Done,
 }
 
-/// Why the transfer fails.
-struct Failure(Fault, AbortCode);
-
-/// Whose fault it is.
+/// Whose fault it is that the transfer fails.
+#[derive(Clone, Copy, Debug)]
 enum Fault {
+    /// The server broke the protocol, unless told otherwise.
+    Violation,
     /// The server refused.
     Refusal,
-    /// The server broke the protocol.
-    Violation,
     /// The server has sent more or fewer bytes than it announced.
     Size,
     /// The caller's payload refused what came.
     Payload,
-}
-
-impl From<AbortCode> for Failure {
-    /// A violation of the protocol, unless told otherwise.
-    fn from(code: AbortCode) -> Failure {
-        Failure(Fault::Violation, code)
-    }
 }
 
 impl Channel {
@@ -207,6 +204,7 @@ impl Channel {
             sender: Sender::new(BLOCK_MAX, false),
             receiver: Receiver::new(BLOCK_MAX, false),
             request: Command([0; 8]),
+            fault: Fault::Violation,
         }
     }
 
@@ -356,14 +354,11 @@ impl Channel {
             }
             State::Finished => self.progress(Ok(Step::Done), now),
             _ => {
-                let step = match self.block_poll(payload) {
-                    Ok(true) => Ok(Step::Send),
-                    Ok(false) => {
-                        let (at, waited) = (self.at, self.timeout);
-                        return self.close(SdoError::Timeout { at, waited }, now);
-                    }
-                    Err(code) => Err(code.into()),
-                };
+                let step = self.block_poll(payload);
+                if let Ok(Step::Ignore) = step {
+                    let (at, waited) = (self.at, self.timeout);
+                    return self.close(SdoError::Timeout { at, waited }, now);
+                }
                 self.progress(step, now)
             }
         }
@@ -394,7 +389,7 @@ impl Channel {
     /// Its own function, so that the command stays in memory: in registers its
     /// fields would be shifted out again and again, for 120 bytes more of flash.
     #[inline(never)]
-    fn answer(&mut self, command: &Command, payload: &mut dyn Payload) -> Result<Step, Failure> {
+    fn answer(&mut self, command: &Command, payload: &mut dyn Payload) -> Result<Step, AbortCode> {
         let Some(answer) = command.answer() else {
             return Ok(Step::Ignore);
         };
@@ -411,7 +406,10 @@ impl Channel {
                 self.begin(false, payload);
                 Ok(Step::Send)
             }
-            (_, Answer::Abort) => Err(Failure(Fault::Refusal, command.abort_code())),
+            (_, Answer::Abort) => {
+                self.fault = Fault::Refusal;
+                Err(command.abort_code())
+            }
             (State::ExpeditedDownload, Answer::Download)
             | (State::BlockDownloadEnd, Answer::BlockDownloadEnd) => {
                 self.done = self.size.unwrap_or(0);
@@ -437,9 +435,9 @@ impl Channel {
         }
     }
 
-    fn progress(&mut self, step: Result<Step, Failure>, now: Instant) -> Progress<Transfer> {
+    fn progress(&mut self, step: Result<Step, AbortCode>, now: Instant) -> Progress<Transfer> {
         let at = self.at;
-        let Failure(fault, code) = match step {
+        let code = match step {
             Ok(Step::Ignore) => return Progress::Nothing,
             Ok(Step::Wait) => {
                 self.deadline = now + self.patience();
@@ -451,9 +449,9 @@ impl Channel {
                 let len = self.done;
                 return Progress::Done(Transfer { at, len });
             }
-            Err(failure) => failure,
+            Err(code) => code,
         };
-        let error = match fault {
+        let error = match core::mem::replace(&mut self.fault, Fault::Violation) {
             Fault::Refusal => {
                 self.state = State::Idle;
                 return Progress::Failed(SdoError::Aborted { at, code }, None);
@@ -474,26 +472,38 @@ impl Channel {
     }
 
     /// An upload begins, of as many bytes as the server tells.
-    fn announced(&mut self, size: Option<u32>, payload: &mut dyn Payload) -> Result<(), Failure> {
+    fn announced(&mut self, size: Option<u32>, payload: &mut dyn Payload) -> Result<(), AbortCode> {
         self.size = size;
-        payload
-            .begin(size)
-            .map_err(|code| Failure(Fault::Payload, code))
+        let begun = payload.begin(size);
+        self.judge(begun)
     }
 
     /// Hands received bytes on, keeping to the size that was announced.
-    fn take(&mut self, data: &[u8], last: bool, payload: &mut dyn Payload) -> Result<(), Failure> {
+    fn take(
+        &mut self,
+        data: &[u8],
+        last: bool,
+        payload: &mut dyn Payload,
+    ) -> Result<(), AbortCode> {
         let offset = self.done;
         let received = offset.checked_add(data.len() as u32);
         let received = received.ok_or(AbortCode::TOO_LONG)?;
         self.done = received;
         let lies = |size: u32| received > size || last && received < size;
         if self.size.is_some_and(lies) {
-            return Err(Failure(Fault::Size, AbortCode::LENGTH_MISMATCH));
+            self.fault = Fault::Size;
+            return Err(AbortCode::LENGTH_MISMATCH);
         }
-        payload
-            .write(offset, data)
-            .map_err(|code| Failure(Fault::Payload, code))
+        let written = payload.write(offset, data);
+        self.judge(written)
+    }
+
+    /// What the payload says.
+    fn judge(&mut self, result: Result<(), AbortCode>) -> Result<(), AbortCode> {
+        if result.is_err() {
+            self.fault = Fault::Payload;
+        }
+        result
     }
 
     fn send(&mut self, now: Instant) -> Frame {

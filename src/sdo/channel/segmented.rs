@@ -1,8 +1,8 @@
 //! Expedited and segmented transfers (CiA 301, 7.2.4.3.3 .. 7.2.4.3.7).
 
-use super::{Channel, Failure, Payload, State, Step};
+use super::{Channel, Payload, State, Step};
 use crate::sdo::AbortCode;
-use crate::sdo::command::{Command, EXPEDITED_MAX, Request, SEGMENT_MAX};
+use crate::sdo::command::{Command, EXPEDITED_MAX, Request};
 
 impl Channel {
     /// CiA 301, 7.2.4.3.3.
@@ -30,7 +30,7 @@ impl Channel {
         &mut self,
         command: &Command,
         payload: &mut dyn Payload,
-    ) -> Result<Step, Failure> {
+    ) -> Result<Step, AbortCode> {
         self.toggled(command)?;
         Ok(if self.left(self.done) == 0 {
             Step::Done
@@ -42,14 +42,22 @@ impl Channel {
     pub(super) fn next_segment(&mut self, payload: &mut dyn Payload) -> Step {
         self.state = State::DownloadSegment;
         self.toggle = !self.toggle;
-        let left = self.left(self.done);
-        let mut data = [0; SEGMENT_MAX];
-        let len = left.min(SEGMENT_MAX);
-        payload.read(self.done, data.get_mut(..len).unwrap_or(&mut []));
+        self.request = Command::bare(Request::DownloadSegment.code(), self.toggle);
+        let (len, last) = self.fill(self.done, payload);
         self.done += len as u32;
-        let code = Request::DownloadSegment.code();
-        self.request = Command::segment(code, self.toggle, len == left, data, len);
+        self.request.close(len, last);
         Step::Send
+    }
+
+    /// Puts the bytes of a segment into the request: how many, and whether they are the
+    /// last.
+    #[inline(never)]
+    pub(super) fn fill(&mut self, offset: u32, payload: &mut dyn Payload) -> (usize, bool) {
+        let left = self.left(offset);
+        let space = self.request.space();
+        let len = left.min(space.len());
+        payload.read(offset, space.get_mut(..len).unwrap_or(&mut []));
+        (len, len == left)
     }
 
     /// How many bytes of a download there are from `offset` on.
@@ -62,7 +70,7 @@ impl Channel {
         &mut self,
         command: &Command,
         payload: &mut dyn Payload,
-    ) -> Result<Step, Failure> {
+    ) -> Result<Step, AbortCode> {
         let size = command.size();
         if !command.is_expedited() {
             self.announced(size, payload)?;
@@ -89,10 +97,10 @@ impl Channel {
         &mut self,
         segment: &Command,
         payload: &mut dyn Payload,
-    ) -> Result<Step, Failure> {
+    ) -> Result<Step, AbortCode> {
         self.toggled(segment)?;
         if segment.is_fruitless() {
-            return Err(AbortCode::COMMAND.into());
+            return Err(AbortCode::COMMAND);
         }
         let last = segment.is_last();
         self.take(segment.data(), last, payload)?;

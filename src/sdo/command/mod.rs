@@ -5,7 +5,7 @@
 //! the server's side and [`Answer`] on the client's; what it says tell its
 //! methods, each of them only for the commands that have the field. Nothing
 //! fails on a length, because every SDO frame has eight bytes. Segments of a
-//! block carry no command specifier: see [`BlockSegment`].
+//! block have a sequence number instead of a command specifier.
 
 mod kind;
 
@@ -60,7 +60,7 @@ pub struct End {
     pub crc: u16,
 }
 
-/// The eight bytes of an SDO frame that is no segment of a block.
+/// The eight bytes of an SDO frame.
 ///
 /// ```
 /// # use canmaster::{id::Address, sdo::command::{Command, Request}};
@@ -115,20 +115,28 @@ impl Command {
         Command::addressed(code | told, at, size.unwrap_or(0).to_le_bytes())
     }
 
-    /// A segment with the first `len` bytes of `data`
-    /// (CiA 301, 7.2.4.3.4, 7.2.4.3.7).
-    pub fn segment(
-        code: u8,
-        toggle: bool,
-        last: bool,
-        data: [u8; SEGMENT_MAX],
-        len: usize,
-    ) -> Command {
-        let Command([head, ..]) = Command::bare(code, toggle);
+    /// Room for the data of a segment.
+    pub const fn space(&mut self) -> &mut [u8; SEGMENT_MAX] {
+        let [_, space @ ..] = &mut self.0;
+        space
+    }
+
+    /// Makes a [`bare`](Self::bare) command a segment with the first `len` bytes that
+    /// were put into its [`space`](Self::space) (CiA 301, 7.2.4.3.4, 7.2.4.3.7).
+    pub fn close(&mut self, len: usize, last: bool) {
         let unused = SEGMENT_MAX.saturating_sub(len) as u8;
-        let [a, b, c, d, e, f, g] = data;
-        let head = head | unused << UNUSED_SHIFT | u8::from(last);
-        Command([head, a, b, c, d, e, f, g])
+        let [head, ..] = &mut self.0;
+        *head |= unused << UNUSED_SHIFT | u8::from(last);
+    }
+
+    /// Makes it a segment of a block, with the seven bytes in its
+    /// [`space`](Self::space): number `sequence` of 1..=127, and whether it is the last
+    /// of the transfer, not merely of the block. How many of the last one's bytes are
+    /// meant is told by the end command (CiA 301, 7.2.4.3.10, 7.2.4.3.14).
+    pub const fn number(&mut self, sequence: u8, last: bool) {
+        let last = if last { block::LAST } else { 0 };
+        let [head, ..] = &mut self.0;
+        *head = last | sequence & block::SEQUENCE_MASK;
     }
 
     /// The initiate of a block transfer by the side that sends the data and
@@ -239,9 +247,24 @@ impl Command {
 
     /// The 0..=7 data bytes of a segment.
     pub fn data(&self) -> &[u8] {
-        let [head, data @ ..] = &self.0;
-        let unused = usize::from(head >> UNUSED_SHIFT & UNUSED_MASK);
-        data.get(..SEGMENT_MAX - unused).unwrap_or(&[])
+        let unused = usize::from(self.head() >> UNUSED_SHIFT & UNUSED_MASK);
+        self.bytes().get(..SEGMENT_MAX - unused).unwrap_or(&[])
+    }
+
+    /// The seven bytes of a segment of a block.
+    pub const fn bytes(&self) -> &[u8; SEGMENT_MAX] {
+        let [_, bytes @ ..] = &self.0;
+        bytes
+    }
+
+    /// The number of a segment of a block; 0 for what is none, as an abort (0x80).
+    pub const fn sequence(&self) -> u8 {
+        self.head() & block::SEQUENCE_MASK
+    }
+
+    /// No segment of a block follows in the whole transfer.
+    pub const fn is_last_of_all(&self) -> bool {
+        self.has(block::LAST)
     }
 
     /// A segment with neither data nor the end: a transfer of such segments
@@ -275,40 +298,5 @@ impl Command {
             unused: head >> block::UNUSED_SHIFT & UNUSED_MASK,
             crc: u16::from_le_bytes([low, high]),
         }
-    }
-}
-
-/// One segment of a block: seven bytes and a sequence number instead of a
-/// command specifier (CiA 301, 7.2.4.3.10, 7.2.4.3.14).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct BlockSegment {
-    /// The last segment of the transfer, not merely of the block.
-    pub last: bool,
-    /// 1..=127.
-    pub sequence: u8,
-    /// How many of the last segment's bytes are meant is told by the end
-    /// command.
-    pub data: [u8; SEGMENT_MAX],
-}
-
-impl BlockSegment {
-    /// `None` if the sequence number is 0, as in an abort (0x80).
-    pub fn decode(bytes: Bytes) -> Option<BlockSegment> {
-        let [head, data @ ..] = bytes;
-        let sequence = head & block::SEQUENCE_MASK;
-        (sequence != 0).then_some(BlockSegment {
-            last: head & block::LAST != 0,
-            sequence,
-            data,
-        })
-    }
-
-    /// The eight bytes of the frame.
-    pub const fn encode(&self) -> Bytes {
-        let last = if self.last { block::LAST } else { 0 };
-        let [a, b, c, d, e, f, g] = self.data;
-        let head = last | (self.sequence & block::SEQUENCE_MASK);
-        [head, a, b, c, d, e, f, g]
     }
 }

@@ -1,10 +1,10 @@
 //! Block transfers (CiA 301, 7.2.4.3.8 .. 7.2.4.3.15).
 
-use super::{Outcome, Phase, Server};
+use super::{Outcome, Phase, Reply, Server};
 use crate::od::ObjectDictionary;
 use crate::sdo::AbortCode;
 use crate::sdo::block::{Receiver, Sender, check_block_size};
-use crate::sdo::command::{Answer, BlockSegment, Command, SEGMENT_MAX};
+use crate::sdo::command::{Answer, Command};
 
 impl Server {
     /// CiA 301, 7.2.4.3.9.
@@ -19,8 +19,8 @@ impl Server {
         self.receiver = Receiver::new(block_size, command.has_crc());
         self.refused = None;
         let code = Answer::BlockDownload.code();
-        self.answer = Some(Command::block_for(code, at, block_size));
-        Ok(())
+        self.answer = Command::block_for(code, at, block_size);
+        Ok(Reply::Answer)
     }
 
     /// While a block is being received a frame has no command specifier, except
@@ -42,20 +42,23 @@ impl Server {
         command: &Command,
         od: &mut impl ObjectDictionary,
     ) -> Outcome {
-        let Some(segment) = BlockSegment::decode(command.0) else {
+        if command.sequence() == 0 {
             return match self.refused.replace(AbortCode::SEQUENCE_NUMBER) {
                 Some(code) => Err(code),
-                None => Ok(()),
+                None => Ok(Reply::Nothing),
             };
-        };
-        let before = self.receiver.segment(&segment)?;
-        if let (Some(data), None) = (before, self.refused) {
-            self.refused = self.transfer.push(od, &data, false).err();
         }
-        self.answer = self.receiver.over();
+        let before = &mut Command([0; 8]);
+        self.receiver.segment(command, before)?;
+        if before.sequence() != 0 && self.refused.is_none() {
+            self.refused = self.transfer.push(od, before.bytes(), false).err();
+        }
+        if !self.receiver.over(&mut self.answer) {
+            return Ok(Reply::Nothing);
+        }
         match self.refused {
-            Some(code) if self.answer.is_some() => Err(code),
-            _ => Ok(()),
+            Some(code) => Err(code),
+            None => Ok(Reply::Answer),
         }
     }
 
@@ -65,12 +68,13 @@ impl Server {
         command: &Command,
         od: &mut impl ObjectDictionary,
     ) -> Outcome {
-        let (data, len) = self.receiver.end(command.end())?;
-        let data = data.get(..len).unwrap_or(&data);
+        let len = self.receiver.end(command.end())?;
+        let data = self.receiver.held().bytes();
+        let data = data.get(..len).unwrap_or(data);
         self.transfer.push(od, data, true)?;
         self.phase = Phase::Idle;
-        self.answer = Some(Command::bare(Answer::BlockDownloadEnd.code(), false));
-        Ok(())
+        self.answer = Command::bare(Answer::BlockDownloadEnd.code(), false);
+        Ok(Reply::Answer)
     }
 
     /// CiA 301, 7.2.4.3.13.
@@ -90,17 +94,18 @@ impl Server {
         self.phase = Phase::BlockUploadStart;
         self.sender = Sender::new(block_size, command.has_crc());
         let code = Answer::BlockUpload.code();
-        self.answer = Some(Command::block_of(code, at, size));
-        Ok(())
+        self.answer = Command::block_of(code, at, size);
+        Ok(Reply::Answer)
     }
 
     /// CiA 301, 7.2.4.3.14.
     pub(super) fn block_upload_acknowledge(&mut self, command: &Command) -> Outcome {
-        self.answer = self.sender.acknowledged(command)?;
-        if self.answer.is_some() {
-            self.phase = Phase::BlockUploadEnd;
+        self.sender.acknowledged(command, &mut self.answer)?;
+        if self.sender.is_sending() {
+            return Ok(Reply::Nothing);
         }
-        Ok(())
+        self.phase = Phase::BlockUploadEnd;
+        Ok(Reply::Answer)
     }
 
     /// At its deadline a block upload sends the next segment, and a block
@@ -109,25 +114,26 @@ impl Server {
     /// # Errors
     /// 05040000h if there is neither to be done: the client is silent.
     pub(super) fn block_poll(&mut self, od: &mut impl ObjectDictionary) -> Outcome {
-        match self.phase {
-            Phase::BlockUpload => {
-                if let Some(offset) = self.sender.next_offset()? {
-                    let mut data = [0; SEGMENT_MAX];
-                    let chunk = self.transfer.read(od, offset, &mut data)?;
-                    self.answer = Some(self.sender.segment(data, chunk.len, chunk.last)?);
-                }
+        let answered = match self.phase {
+            Phase::BlockUpload if self.sender.is_sending() => {
+                self.answer = Command([0; 8]);
+                let offset = self.sender.next_offset()?;
+                let chunk = self.transfer.read(od, offset, self.answer.space())?;
+                self.sender
+                    .segment(&mut self.answer, chunk.len, chunk.last)?;
+                true
             }
             Phase::BlockDownload => {
                 if let Some(code) = self.refused {
                     return Err(code);
                 }
-                self.answer = self.receiver.stall();
+                self.receiver.stall(&mut self.answer)
             }
-            _ => {}
-        }
-        match self.answer {
-            Some(_) => Ok(()),
-            None => Err(AbortCode::TIMEOUT),
+            _ => false,
+        };
+        match answered {
+            true => Ok(Reply::Answer),
+            false => Err(AbortCode::TIMEOUT),
         }
     }
 }

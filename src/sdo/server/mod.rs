@@ -24,6 +24,8 @@ const NOWHERE: Address = Address::new(0, 0);
 
 /// An SDO server (CiA 301, 7.2.4, 7.5.2.33).
 #[derive(Clone, Debug)]
+// In this order, so that what is used most is near: it takes shorter instructions.
+#[repr(C)]
 pub struct Server {
     request: CobId,
     response: CobId,
@@ -42,8 +44,8 @@ pub struct Server {
     receiver: Receiver,
     /// In a block download, the entry has refused what came.
     refused: Option<AbortCode>,
-    /// What the client is to be told next.
-    answer: Option<Command>,
+    /// What the client is told.
+    answer: Command,
 }
 
 /// Which transfer is under way, and what it waits for.
@@ -65,7 +67,16 @@ enum Phase {
 }
 
 /// Whether what the client wants can be done: if not, the transfer is aborted.
-type Outcome = Result<(), AbortCode>;
+type Outcome = Result<Reply, AbortCode>;
+
+/// Whether there is an answer. As wide as an abort code, so that either comes back in
+/// registers.
+#[derive(Clone, Copy)]
+#[repr(u32)]
+enum Reply {
+    Nothing,
+    Answer,
+}
 
 impl Server {
     /// The default server of `node`: requests on 600h + node-ID, answers on
@@ -83,7 +94,7 @@ impl Server {
             sender: Sender::new(BLOCK_MAX, false),
             receiver: Receiver::new(BLOCK_MAX, false),
             refused: None,
-            answer: None,
+            answer: Command([0; 8]),
         }
     }
 
@@ -185,29 +196,32 @@ impl Server {
             self.reset(od);
         }
         match (request, self.phase) {
-            (Request::Abort, _) => {}
-            (Request::Download, _) => self.download(command, od)?,
+            (Request::Abort, _) => Ok(Reply::Nothing),
+            (Request::Download, _) => self.download(command, od),
             (Request::Upload, _) => {
                 self.transfer.open_upload(od, command.address())?;
-                self.upload(od)?;
+                self.upload(od)
             }
-            (Request::BlockDownload, _) if self.block_size > 0 => {
-                self.block_download(command, od)?
-            }
-            (Request::BlockUpload, _) if self.block_size > 0 => self.block_upload(command, od)?,
-            (Request::DownloadSegment, Phase::Download) => self.download_segment(command, od)?,
-            (Request::UploadSegment, Phase::Upload) => self.upload_segment(command, od)?,
+            (Request::BlockDownload, _) if self.block_size > 0 => self.block_download(command, od),
+            (Request::BlockUpload, _) if self.block_size > 0 => self.block_upload(command, od),
+            (Request::DownloadSegment, Phase::Download) => self.download_segment(command, od),
+            (Request::UploadSegment, Phase::Upload) => self.upload_segment(command, od),
             (Request::BlockDownloadEnd, Phase::BlockDownload) => {
-                self.block_download_end(command, od)?;
+                self.block_download_end(command, od)
             }
-            (Request::BlockUploadStart, Phase::BlockUploadStart) => self.phase = Phase::BlockUpload,
+            (Request::BlockUploadStart, Phase::BlockUploadStart) => {
+                self.phase = Phase::BlockUpload;
+                Ok(Reply::Nothing)
+            }
             (Request::BlockUploadAcknowledge, Phase::BlockUpload) => {
-                self.block_upload_acknowledge(command)?;
+                self.block_upload_acknowledge(command)
             }
-            (Request::BlockUploadEnd, Phase::BlockUploadEnd) => self.phase = Phase::Idle,
-            _ => return Err(AbortCode::COMMAND),
+            (Request::BlockUploadEnd, Phase::BlockUploadEnd) => {
+                self.phase = Phase::Idle;
+                Ok(Reply::Nothing)
+            }
+            _ => Err(AbortCode::COMMAND),
         }
-        Ok(())
     }
 
     /// What the client is told, if anything.
@@ -219,12 +233,15 @@ impl Server {
         od: &mut impl ObjectDictionary,
     ) -> Option<Frame> {
         self.deadline = now + self.patience();
-        if let Err(code) = outcome {
-            self.reset(od);
-            self.answer = Some(Command::abort(at, code));
+        match outcome {
+            Ok(Reply::Nothing) => return None,
+            Ok(Reply::Answer) => {}
+            Err(code) => {
+                self.reset(od);
+                self.answer = Command::abort(at, code);
+            }
         }
-        let answer = self.answer.take()?;
-        Some(Frame::full(self.response, answer.0))
+        Some(Frame::full(self.response, self.answer.0))
     }
 
     /// How long the client may be silent.

@@ -1,9 +1,9 @@
 //! Expedited and segmented transfers (CiA 301, 7.2.4.3.3 .. 7.2.4.3.7).
 
-use super::{Outcome, Phase, Server};
+use super::{Outcome, Phase, Reply, Server};
 use crate::od::ObjectDictionary;
 use crate::sdo::AbortCode;
-use crate::sdo::command::{Answer, Command, EXPEDITED_MAX, SEGMENT_MAX};
+use crate::sdo::command::{Answer, Command, EXPEDITED_MAX};
 
 impl Server {
     /// CiA 301, 7.2.4.3.3.
@@ -27,8 +27,8 @@ impl Server {
             self.phase = Phase::Idle;
         }
         let code = Answer::Download.code();
-        self.answer = Some(Command::addressed(code, at, [0; 4]));
-        Ok(())
+        self.answer = Command::addressed(code, at, [0; 4]);
+        Ok(Reply::Answer)
     }
 
     /// CiA 301, 7.2.4.3.4.
@@ -47,8 +47,8 @@ impl Server {
             self.phase = Phase::Idle;
         }
         let code = Answer::DownloadSegment.code();
-        self.answer = Some(Command::bare(code, toggle));
-        Ok(())
+        self.answer = Command::bare(code, toggle);
+        Ok(Reply::Answer)
     }
 
     /// CiA 301, 7.2.4.3.6.
@@ -57,12 +57,14 @@ impl Server {
         let chunk = self.transfer.read(od, 0, &mut first)?;
         let (code, at) = (Answer::Upload.code(), self.transfer.at);
         let whole = first.get(..chunk.len).filter(|_| chunk.last);
-        self.answer = whole.and_then(|whole| Command::expedited(code, at, whole));
-        if self.answer.is_none() {
-            self.phase = Phase::Upload;
-            self.answer = Some(Command::segmented(code, at, chunk.size));
-        }
-        Ok(())
+        self.answer = match whole.and_then(|whole| Command::expedited(code, at, whole)) {
+            Some(expedited) => expedited,
+            None => {
+                self.phase = Phase::Upload;
+                Command::segmented(code, at, chunk.size)
+            }
+        };
+        Ok(Reply::Answer)
     }
 
     /// CiA 301, 7.2.4.3.7.
@@ -72,14 +74,13 @@ impl Server {
         od: &mut impl ObjectDictionary,
     ) -> Outcome {
         let toggle = self.toggled(request)?;
-        let mut data = [0; SEGMENT_MAX];
-        let chunk = self.transfer.next(od, &mut data)?;
+        self.answer = Command::bare(Answer::UploadSegment.code(), toggle);
+        let chunk = self.transfer.next(od, self.answer.space())?;
         if chunk.last {
             self.phase = Phase::Idle;
         }
-        let code = Answer::UploadSegment.code();
-        self.answer = Some(Command::segment(code, toggle, chunk.last, data, chunk.len));
-        Ok(())
+        self.answer.close(chunk.len, chunk.last);
+        Ok(Reply::Answer)
     }
 
     /// The toggle bit of a request, which alternates from one to the next.

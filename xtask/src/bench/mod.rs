@@ -2,11 +2,13 @@
 //! emulated board, judged on the bus; and instructions of the library's hot
 //! functions.
 
+mod choices;
 mod cycle;
 pub(crate) mod instructions;
 mod motion;
 pub(crate) mod realtime;
 mod sdo;
+mod self_measurement;
 mod startup;
 
 use std::process::ExitCode;
@@ -31,6 +33,11 @@ pub(crate) fn command(options: &BenchOptions) -> Result<ExitCode> {
             cycle::run(options.seed, span, options.document)?
         }
         Bench::Realtime => realtime::run(&order(options))?,
+        Bench::Choices => choices::run(options.seed)?,
+        Bench::SelfMeasurement => {
+            let span = Time::from_secs_f64(options.seconds.unwrap_or(CYCLE_S));
+            self_measurement::run(options.seed, span)?
+        }
     };
     if options.json {
         println!("{}", outcome.json);

@@ -8,7 +8,7 @@ use canmaster_sim::time::Time;
 use canmaster_sim::world::{Image, Record, Scenario, World, trials};
 use serde::Serialize;
 
-use crate::bench::realtime::{self, Case, Order};
+use crate::bench::realtime::{self, Case};
 use crate::networks::{self, Variant};
 
 /// The interrupts whose tasks are made to hang, in turn.
@@ -191,22 +191,39 @@ impl Row {
         }
     }
 
-    /// A scenario of `bench realtime`.
-    pub(super) fn real_time(case: &'static Case, order: &Order) -> Row {
-        let started = Instant::now();
-        let (missed, real_time) = match realtime::measure(case, order) {
-            Ok(figures) => (figures.missed_limits(case), Some(figures)),
-            Err(error) => (vec![format!("{error:#}")], None),
-        };
-        Row {
-            seed: *order.seeds.end(),
+    /// A scenario of `bench realtime` with all seeds.
+    pub(super) fn real_time(
+        case: &'static Case,
+        seeds: u64,
+        runs: Vec<Result<realtime::Figures, String>>,
+        wall_s: f64,
+    ) -> Row {
+        let mut missed = Vec::new();
+        let mut real_time: Option<realtime::Figures> = None;
+        for run in runs {
+            match (run, real_time.take()) {
+                (Ok(figures), None) => real_time = Some(figures),
+                (Ok(figures), Some(all)) => real_time = Some(all.and(figures)),
+                (Err(words), all) => {
+                    missed.push(words);
+                    real_time = all;
+                }
+            }
+        }
+        missed.extend(real_time.iter().flat_map(|all| all.missed_limits(case)));
+        let row = Row {
+            seed: seeds,
             kind: case.name.to_string(),
             ok: missed.is_empty(),
             reason: missed.join("; "),
-            wall_s: started.elapsed().as_secs_f64(),
+            wall_s,
             figures: None,
             real_time,
+        };
+        if !row.ok {
+            eprintln!("{}: {}", row.kind, row.reason);
         }
+        row
     }
 
     /// What stands over the columns of [`cells`](Self::cells).

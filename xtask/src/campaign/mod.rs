@@ -12,7 +12,7 @@ use canmaster_sim::time::Time;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
-use crate::bench::realtime::{CASES, Order};
+use crate::bench::realtime::{self, CASES};
 use crate::cargo;
 use crate::cli::CampaignOptions;
 use crate::machine::Checked;
@@ -71,7 +71,7 @@ pub(crate) fn command(options: &CampaignOptions) -> Result<ExitCode> {
     let runs: Vec<Row> = runs
         .into_iter()
         .chain(networks::all().map(network))
-        .chain(real_time())
+        .chain(real_time(workers))
         .collect();
     let wall_s = started.elapsed().as_secs_f64();
     let ok = runs.iter().filter(|row| row.ok).count();
@@ -111,15 +111,31 @@ fn network(variant: Variant) -> Row {
 }
 
 /// The scenarios of `bench realtime`, long and with several seeds.
-fn real_time() -> Vec<Row> {
-    let order = Order {
-        scenario: None,
-        seeds: 1..=REALTIME_SEEDS,
-        span: REALTIME_SPAN,
-    };
-    CASES
-        .iter()
-        .map(|case| Row::real_time(case, &order))
+fn real_time(workers: usize) -> Vec<Row> {
+    let started = Instant::now();
+    let images: Vec<_> = CASES.iter().map(realtime::built).collect();
+    let jobs: Vec<(usize, u64)> = (1..=REALTIME_SEEDS)
+        .flat_map(|seed| (0..CASES.len()).map(move |case| (case, seed)))
+        .collect();
+    let bar = progress(jobs.len());
+    let runs = pool::run(
+        &jobs,
+        workers,
+        |&(case, seed)| {
+            let built = images[case].as_ref().map_err(|e| format!("{e:#}"))?;
+            realtime::measure_one(&CASES[case], built, seed, REALTIME_SPAN)
+                .map_err(|e| format!("seed {seed}: {e:#}"))
+        },
+        |_| bar.inc(1),
+    );
+    bar.finish_and_clear();
+    let wall_s = started.elapsed().as_secs_f64();
+    let mut of_case: Vec<Vec<_>> = CASES.iter().map(|_| Vec::new()).collect();
+    for ((case, _), run) in jobs.iter().zip(runs) {
+        of_case[*case].push(run);
+    }
+    let rows = CASES.iter().zip(of_case);
+    rows.map(|(case, runs)| Row::real_time(case, REALTIME_SEEDS, runs, wall_s))
         .collect()
 }
 

@@ -1,6 +1,7 @@
 //! Frames as the message RAM holds them (RM0440, 44.3.4 and 44.3.5).
 
 use crate::message_ram::USED_WORDS;
+use core::arch::asm;
 use embedded_can::{Frame, StandardId};
 
 const REMOTE: u32 = 1 << 29;
@@ -39,6 +40,26 @@ impl Element {
         Element([id, control | EVENT, low, high])
     }
 
+    /// The same, worked out here: the compiler would do it as late as it can, which
+    /// is while the SYNC is held off.
+    #[inline(always)]
+    pub fn made(self) -> Element {
+        let [mut id, mut control, mut low, mut high] = self.0;
+        // SAFETY: no instruction; the compiler takes it for one that needs the four
+        // words.
+        unsafe {
+            asm!(
+                "/* {0} {1} {2} {3} */",
+                inout(reg) id,
+                inout(reg) control,
+                inout(reg) low,
+                inout(reg) high,
+                options(nomem, nostack, preserves_flags)
+            );
+        }
+        Element([id, control, low, high])
+    }
+
     /// From now on `data` is the only byte, or there is none.
     #[inline(always)]
     pub fn set_byte(&mut self, data: Option<u8>) {
@@ -52,10 +73,6 @@ impl Element {
 
     pub(crate) const fn identifier(&self) -> u16 {
         ((self.0[0] >> STANDARD_SHIFT) & STANDARD_MASK) as u16
-    }
-
-    pub(crate) const fn has_data(&self) -> bool {
-        self.0[1] & !EVENT != 0
     }
 }
 

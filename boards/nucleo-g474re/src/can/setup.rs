@@ -3,12 +3,7 @@
 use super::{Controller, FILTERS, RangeFilter, Rx, Tx, registers};
 use crate::message_ram::{self, DEPTH};
 use core::num::{NonZeroU8, NonZeroU16};
-use fdcan::{
-    ConfigMode, FdCan,
-    config::{FdCanConfig, FrameTransmissionConfig, GlobalFilter, NominalBitTiming},
-    interrupt::Interrupts,
-};
-use stm32g4xx_hal::pac::fdcan::RegisterBlock;
+use fdcan::{config::NominalBitTiming, interrupt::Interrupts};
 
 /// How the controller makes a bit of its clock, the 24 MHz of the crystal. The
 /// jump width is all of segment 2: the wider, the more clock error between the
@@ -66,63 +61,85 @@ impl Rx {
     }
 }
 
+/// Configures a controller whose clock is on, and lets it take part in the traffic.
+///
+/// Register by register: the fdcan crate would first write all 848 bytes of the
+/// message RAM, of which only the filters have to be, and its `into_normal` loses the
+/// global filter, so that every frame that no filter wants, extended and remote ones
+/// too, would end in FIFO 0. What it leaves as the reset made it is left here, too.
+///
 /// # Panics
 ///
-/// If there are more than [`FILTERS`] filters, or the controller is not the
-/// one that is expected.
-pub(crate) fn setup<I: fdcan::Instance>(
-    mut can: FdCan<I, ConfigMode>,
-    controller: Controller,
-    settings: &Settings,
-) {
+/// If there are more than [`FILTERS`] filters.
+pub(crate) fn setup(controller: Controller, settings: &Settings) {
     let filters = settings.filters;
     assert!(filters.len() <= FILTERS);
-    can.apply_config(
-        FdCanConfig::default()
-            .set_nominal_bit_timing(settings.timing.0)
-            .set_frame_transmit(FrameTransmissionConfig::ClassicCanOnly)
-            .set_global_filter(GlobalFilter::reject_all()),
-    );
+    let registers = registers(controller);
+    let control = registers.cccr();
+    control.write(|w| w.init().set_bit());
+    while control.read().init().bit_is_clear() {}
+    control.write(|w| w.init().set_bit().cce().set_bit());
+    let timing = settings.timing.0;
+    // SAFETY: one less than what was found to be in the range of each field.
+    registers.nbtp().write(|w| unsafe {
+        w.nbrp()
+            .bits(timing.prescaler.get() - 1)
+            .ntseg1()
+            .bits(timing.seg1.get() - 1)
+            .ntseg2()
+            .bits(timing.seg2.get() - 1)
+            .nsjw()
+            .bits(timing.sync_jump_width.get() - 1)
+    });
     for (index, filter) in filters.iter().enumerate() {
-        // SAFETY: the clock is on since the controller was taken; the number of
-        // filters was checked; the controller does not run yet.
+        // SAFETY: the clock is on, as the caller says; the number of filters was
+        // checked; the controller does not run yet.
         unsafe { message_ram::write_filter(controller, index, filter) };
     }
-    can.enable_interrupts(
-        Interrupts::RX_FIFO0_NEW_MSG
-            | Interrupts::RX_FIFO0_MSG_LOST
-            | Interrupts::RX_FIFO1_NEW_MSG
-            | Interrupts::RX_FIFO1_MSG_LOST
-            | Interrupts::TX_COMPLETE
-            | Interrupts::ERR_PASSIVE
-            | Interrupts::WARNING_STATUS
-            | Interrupts::BUS_OFF,
-    );
-    let registers = registers(controller);
-    // The completion of any of the three buffers raises TX_COMPLETE.
+    // SAFETY: as many standard filters as were written, no extended one; `REJECT` is
+    // a value of both fields.
+    registers.rxgfc().write(|w| unsafe {
+        w.rrfe()
+            .set_bit()
+            .rrfs()
+            .set_bit()
+            .anfe()
+            .bits(REJECT)
+            .anfs()
+            .bits(REJECT)
+            .lss()
+            .bits(filters.len() as u8)
+    });
+    // The lowest identifier first.
+    registers.txbc().write(|w| w.tfqm().set_bit());
+    // SAFETY: the flags that `Flags` knows, and the completion of any of the three
+    // buffers.
+    registers
+        .ie()
+        .write(|w| unsafe { w.bits(INTERRUPTS.bits()) });
     // SAFETY: the enable bits of the three buffers.
     registers
         .txbtie()
         .write(|w| unsafe { w.bits((1 << DEPTH) - 1) });
-    // Line 0, by register: the crate has the two enable bits swapped. ILS was
-    // left 0 above, which routes every group there.
+    // Line 0, to which ILS routes every group after a reset.
     registers.ile().write(|w| w.eint0().set_bit());
     // Time stamps are TIM3's count: the microseconds of the period.
     // SAFETY: one of the three sources.
     registers
         .tscc()
         .write(|w| unsafe { w.bits(TIME_STAMPS_BY_TIM3) });
-    start(registers);
-}
-
-const TIME_STAMPS_BY_TIM3: u32 = 0b10;
-
-/// Leaves configuration mode. Not by the crate's `into_normal`: that applies the
-/// configuration anew from a copy that lacks the global filter, and every frame
-/// that no filter wants, extended and remote ones too, would end in FIFO 0.
-fn start(registers: &RegisterBlock) {
-    let control = registers.cccr();
-    control.modify(|_, w| w.cce().clear_bit());
-    control.modify(|_, w| w.init().clear_bit());
+    control.write(|w| w.init().clear_bit());
     while control.read().init().bit_is_set() {}
 }
+
+/// ANFE, ANFS: what no filter wants is not received.
+const REJECT: u8 = 0b11;
+const TIME_STAMPS_BY_TIM3: u32 = 0b10;
+const INTERRUPTS: Interrupts = Interrupts::RX_FIFO0_NEW_MSG
+    .union(Interrupts::RX_FIFO0_MSG_LOST)
+    .union(Interrupts::RX_FIFO1_NEW_MSG)
+    .union(Interrupts::RX_FIFO1_MSG_LOST)
+    .union(Interrupts::TX_COMPLETE)
+    .union(Interrupts::ERR_PASSIVE)
+    .union(Interrupts::WARNING_STATUS)
+    .union(Interrupts::BUS_OFF);

@@ -55,20 +55,28 @@ fn interrupts_off_and_masked_are_measured_from_the_first_interrupt_on() {
     handler.push(CPSID_I);
     handler.extend([NOP; 50]);
     handler.push(CPSIE_I);
-    // BASEPRI at TIM2's priority for 30 cycles and back.
-    handler.extend(load(1, 0x50));
-    handler.extend(MSR_BASEPRI_R1);
-    handler.extend([NOP; 30]);
-    handler.extend(load(1, 0));
-    handler.extend(MSR_BASEPRI_R1);
+    // BASEPRI at TIM2's priority for so many cycles and back.
+    let masked = |nops: usize| {
+        let mut code = load(1, 0x50).to_vec();
+        code.extend(MSR_BASEPRI_R1);
+        code.extend(vec![NOP; nops]);
+        code.extend(load(1, 0));
+        code.extend(MSR_BASEPRI_R1);
+        code
+    };
+    // In its own handler that holds nobody back.
+    handler.extend(masked(60));
     let mut board = Program::default()
         .then([CPSID_I])
         .then([NOP; 200])
         .then([CPSIE_I])
         .store(NVIC_IPR_TIM2 & !3, 0x50)
+        .store(SYST_RVR, 15_999)
+        .store(SYST_CSR, 0b111)
         .tim2_every(16_000)
         .sleeps()
         .handler(TIM2_EXCEPTION, handler)
+        .handler(SYSTICK_EXCEPTION, masked(30))
         .board();
     board.run(Time::from_ms(3));
     let stats = board.stats();

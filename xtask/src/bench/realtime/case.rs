@@ -66,6 +66,9 @@ pub(crate) struct Case {
     tuned: fn(DriveConfig) -> DriveConfig,
     /// Warnings, a slow drive, and somebody who reads the board's dictionary.
     pub(super) disturbed: bool,
+    /// The board is asked what it measures of itself: by frames that have no place in
+    /// the layout of a cycle, so that it must have some room to spare.
+    pub(super) asked: bool,
     pub(super) limits: Limits,
 }
 
@@ -75,6 +78,7 @@ pub(crate) const CASES: [Case; 4] = [
         name: "one_bus_2ms",
         tuned: |config| answering(config, ANSWER_2MS),
         disturbed: false,
+        asked: true,
         limits: Limits {
             load: Some(LOAD),
             cpu_load: Some(0.05),
@@ -86,18 +90,21 @@ pub(crate) const CASES: [Case; 4] = [
         name: "two_bus_1ms",
         tuned: |config| answering(config, ANSWER_1MS),
         disturbed: false,
+        asked: true,
         limits: QUIET,
     },
     Case {
         name: "three_bus_1ms_full",
         tuned: |config| answering(config, ANSWER_1MS),
         disturbed: false,
+        asked: true,
         limits: QUIET,
     },
     Case {
         name: "one_bus_2ms_disturbed",
         tuned: |config| answering(config, ANSWER_2MS),
         disturbed: true,
+        asked: true,
         limits: Limits {
             jitter_us: ONE_FRAME_LATE_US,
             cpu_load: None,
@@ -113,6 +120,7 @@ pub(crate) const SEARCHED: Case = Case {
     name: "search",
     tuned: |config| answering(config, ANSWER_1MS),
     disturbed: false,
+    asked: false,
     limits: Limits {
         cpu_load: None,
         last_request_cycles: FIRST_REQUEST_CYCLES,
@@ -131,13 +139,13 @@ fn answering(config: DriveConfig, sdo_latency: Spread) -> DriveConfig {
 
 impl Case {
     /// Its description.
-    pub(super) fn path(&self) -> PathBuf {
+    pub(in crate::bench) fn path(&self) -> PathBuf {
         let file = format!("{}.toml", self.name);
         cargo::workspace().join(FOLDER).join(file)
     }
 
     /// What is simulated: motion all the time.
-    pub(super) fn scenario(&self, machine: &Machine, seed: u64) -> Scenario {
+    pub(in crate::bench) fn scenario(&self, machine: &Machine, seed: u64) -> Scenario {
         let scenario = Scenario::new(seed, Time::MAX);
         let scenario = scenario.restless().tuned(self.tuned);
         if !self.disturbed {

@@ -1,9 +1,10 @@
 //! Real time: whether the image holds its cycle in the scenarios of `networks`,
 //! how even its SYNC is, and what it costs. Judged on the wires and by the
-//! emulated board; nothing is reported by the firmware about itself.
+//! emulated board; what the firmware reports about itself stands beside it.
 
 mod case;
 mod figures;
+mod own;
 pub(super) mod session;
 
 use std::time::Instant;
@@ -18,7 +19,8 @@ use crate::table;
 pub(super) use case::SEARCHED;
 pub(crate) use case::{CASES, Case};
 pub(crate) use figures::Figures;
-pub(super) use session::Built;
+pub(super) use figures::between;
+pub(crate) use session::Built;
 
 /// What is asked for.
 #[derive(Clone, Debug)]
@@ -59,7 +61,7 @@ pub(super) fn run(order: &Order) -> Result<Outcome> {
         scenarios.push(figures);
     }
     let mut table = table::new(&Figures::HEADING);
-    table::align_right(&mut table, &std::array::from_fn::<_, 13, _>(|k| k + 1));
+    table::align_right(&mut table, &std::array::from_fn::<_, 14, _>(|k| k + 1));
     for figures in &scenarios {
         table.add_row(figures.cells());
     }
@@ -73,10 +75,20 @@ pub(super) fn run(order: &Order) -> Result<Outcome> {
     })
 }
 
-/// Builds the image of a scenario and runs it with every seed.
-pub(crate) fn measure(case: &Case, order: &Order) -> Result<Figures> {
+/// Builds the image of a scenario.
+pub(crate) fn built(case: &Case) -> Result<Built> {
     eprintln!("{}", case.name);
-    let built = Built::new(&case.path())?;
+    Built::new(&case.path())
+}
+
+/// One run of a scenario.
+pub(crate) fn measure_one(case: &Case, built: &Built, seed: u64, span: Time) -> Result<Figures> {
+    session::run(case, built, seed, span, &ProgressBar::hidden())
+}
+
+/// Builds the image of a scenario and runs it with every seed.
+fn measure(case: &Case, order: &Order) -> Result<Figures> {
+    let built = built(case)?;
     let bar = bar();
     let mut all: Option<Figures> = None;
     for seed in order.seeds.clone() {

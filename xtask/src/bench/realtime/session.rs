@@ -13,6 +13,7 @@ use indicatif::ProgressBar;
 
 use super::case::Case;
 use super::figures::{Figures, Measured};
+use super::own::{Counters, Own};
 use crate::machine::{Checked, Description};
 
 /// All axes turn by then.
@@ -67,65 +68,93 @@ pub(crate) fn run(
         let (at, words) = (world.now(), words.join("\n"));
         bail!("the axes do not turn at {at} s; the firmware's last words:\n{words}");
     }
-    world.clear_stats();
+    let master = world.machine().network().master.node;
+    let mut client = Client::new(world, master);
+    let before = client.world.now();
+    let counters = match case.asked {
+        true => Some(Counters::begin(&mut client)?),
+        false => None,
+    };
+    client.world.clear_stats();
     let started = Instant::now();
-    let from = world.now();
+    let from = client.world.now();
     let to = from + span;
     bar.set_message(format!("{}, seed {seed}", case.name));
-    let mut transfers = 0;
-    let mut refused = Vec::new();
-    if case.disturbed {
-        let mut outsider = Outsider::new(world);
-        while outsider.client.world.now() < to {
-            outsider.read();
-            bar.set_position((outsider.client.world.now() - from).as_ms());
+    let mut outsider = case.disturbed.then(|| Outsider::new(&client.world));
+    while client.world.now() < to {
+        match &mut outsider {
+            Some(outsider) => outsider.read(&mut client),
+            None => {
+                let next = (client.world.now() + LOOK).min(to);
+                client.world.run_until(next);
+            }
         }
-        transfers = outsider.transfers;
-        refused = outsider.refused;
-        world = outsider.client.world;
-    } else {
-        while world.now() < to {
-            let next = (world.now() + LOOK).min(to);
-            world.run_until(next);
-            bar.set_position((world.now() - from).as_ms());
-        }
+        bar.set_position((client.world.now() - from).as_ms());
     }
+    let to = client.world.now();
+    let wall_s = started.elapsed().as_secs_f64();
+    let stats = client.world.board().stats();
+    let (own, after) = match counters {
+        Some(counters) => {
+            let (own, after) = Own::read(&mut client, counters)?;
+            (Some(own), after)
+        }
+        None => (None, to),
+    };
+    let (transfers, refused) = outsider
+        .map(|outsider| (outsider.transfers, outsider.refused))
+        .unwrap_or_default();
     let measured = Measured {
-        record: world.finish(),
-        from,
-        to,
+        record: client.world.finish(),
+        span: Span {
+            before,
+            from,
+            to,
+            after,
+        },
+        stats,
+        own,
         wire_bound_us: built.wire_bound_us,
-        wall_s: started.elapsed().as_secs_f64(),
+        wall_s,
         outside_transfers: transfers,
         refused,
     };
     Ok(Figures::new(case, &measured))
 }
 
+/// What is looked at.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Span {
+    /// The board may have begun anew from then on, and has at `from`.
+    pub(super) before: Time,
+    pub(super) from: Time,
+    pub(super) to: Time,
+    /// Between `to` and then the board has said what it measured.
+    pub(super) after: Time,
+}
+
 /// Somebody who reads the board's dictionary by block transfer, over and over.
-struct Outsider<'i> {
-    client: Client<'i>,
+struct Outsider {
     nodes: Vec<NodeId>,
     transfers: usize,
     refused: Vec<String>,
 }
 
-impl<'i> Outsider<'i> {
-    fn new(world: World<'i>) -> Outsider<'i> {
+impl Outsider {
+    fn new(world: &World<'_>) -> Outsider {
         let network = world.machine().network();
         Outsider {
             nodes: network.nodes.iter().map(|node| node.id).collect(),
-            client: Client::new(world, network.master.node),
             transfers: 0,
             refused: Vec::new(),
         }
     }
 
     /// The next object.
-    fn read(&mut self) {
+    fn read(&mut self, client: &mut Client<'_>) {
         let turn = self.transfers % self.nodes.len();
         let at = Address::new(CONCISE_DCF, self.nodes[turn].get());
-        if let Err(error) = self.client.read(at, Protocol::Block) {
+        if let Err(error) = client.read(at, Protocol::Block) {
             self.refused
                 .push(format!("reading {at} of the board: {error}"));
         }
