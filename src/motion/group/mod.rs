@@ -24,7 +24,7 @@ use super::contract::{Cell, Event, cell};
 use super::mode::Mode;
 use super::path::{Knot, Point};
 use super::{AxisConfig, FaultCause, GroupConfig, GroupEvent, GroupState, fixed};
-use crate::cia402::{Command, ControlWord, Goal, State};
+use crate::cia402::{Command, ControlWord, Goal};
 use crate::time::{Duration, Instant};
 use heapless::Deque;
 
