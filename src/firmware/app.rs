@@ -410,7 +410,7 @@ mod app {
         let events_to = &mut local.events_to;
         let shared = &mut cx.shared;
         // Their ceiling is the priority of this task: nobody waits for them.
-        let theirs = (&mut shared.control, &mut shared.commands, &mut shared.axes);
+        let mut theirs = (&mut shared.control, &mut shared.commands, &mut shared.axes);
         theirs.lock(|shared_control, commands, axes| {
             axes.read(&cycle, &mut shared.od);
             axes.step(&cycle, &control, commands);

@@ -192,7 +192,7 @@ fn missed_cycles_count_for_the_time() {
 #[test]
 fn references_go_on_in_missed_cycles() {
     const MISSED: u32 = 3;
-    for steps in 0..40 {
+    for steps in 0..15 {
         let gone_on = |each: u32| {
             let mut rig = Rig::standby(7);
             rig.released();
