@@ -28,11 +28,7 @@ pub use stm32g4xx_hal::pac;
 
 use can::Controller;
 use pins::uses;
-use stm32g4xx_hal::{
-    gpio::GpioExt,
-    pwr::PwrExt,
-    rcc::{Enable, RccExt},
-};
+use stm32g4xx_hal::{gpio::GpioExt, rcc::RccExt};
 
 /// How fast the core and the timers run.
 pub const CORE_HZ: u32 = 170_000_000;
@@ -98,11 +94,16 @@ pub fn setup<const CAN: u8>(peripherals: pac::Peripherals, config: &Config) -> D
     // First of all, so that whatever hangs below ends in a reset, too.
     let watchdog = watchdog::start(peripherals.IWDG, &peripherals.DBGMCU, config.watchdog_ms);
 
-    let rcc = peripherals.RCC.constrain();
-    let power = clock::power(&rcc, peripherals.PWR.constrain());
+    let mut rcc = peripherals.RCC.constrain();
     let reset_cause = reset_cause::ResetCause::from(rcc.get_reset_reason());
-    let mut rcc = rcc.freeze(clock::config(), power);
     rcc.clear_reset_reason();
+    // Nothing of it is used before the clock is there, which takes milliseconds.
+    rcc.apb1enr1().write(|w| {
+        w.tim2en().set_bit().tim3en().set_bit();
+        w.tim5en().set_bit().tim7en().set_bit();
+        w.fdcanen().set_bit().pwren().set_bit()
+    });
+    clock::setup(&rcc, &peripherals.PWR, &peripherals.FLASH);
 
     let pins = pins::setup::<CAN>(
         peripherals.GPIOA.split(&mut rcc),
@@ -110,7 +111,6 @@ pub fn setup<const CAN: u8>(peripherals: pac::Peripherals, config: &Config) -> D
         peripherals.GPIOC.split(&mut rcc),
     );
     let [first, second, third] = &config.can;
-    pac::FDCAN1::enable(&mut rcc);
     if uses(CAN, 0) {
         can::setup(Controller::FDCAN1, first);
     }
@@ -127,7 +127,6 @@ pub fn setup<const CAN: u8>(peripherals: pac::Peripherals, config: &Config) -> D
             tim5: peripherals.TIM5,
             tim7: peripherals.TIM7,
         },
-        &mut rcc,
         config.period_us,
         config.deadline_us,
         config.second_us,

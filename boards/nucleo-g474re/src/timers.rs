@@ -2,10 +2,7 @@
 //! tick too many and uses 16 bits only.
 
 use crate::CORE_HZ;
-use stm32g4xx_hal::{
-    pac,
-    rcc::{Enable, Rcc, Reset},
-};
+use stm32g4xx_hal::pac;
 
 const MICROSECONDS_PER_SECOND: u32 = 1_000_000;
 /// Ticks of the core's clock in a microsecond.
@@ -176,26 +173,13 @@ pub(crate) struct Timers {
     pub(crate) microseconds: Microseconds,
 }
 
+/// Their clocks are on, and they are as the reset made them.
+///
 /// # Panics
 ///
 /// If `period_us` is 0 or `deadline_us` does not lie within the period.
-pub(crate) fn setup(
-    p: Peripherals,
-    rcc: &mut Rcc,
-    period_us: u16,
-    deadline_us: u16,
-    second_us: u16,
-) -> Timers {
+pub(crate) fn setup(p: Peripherals, period_us: u16, deadline_us: u16, second_us: u16) -> Timers {
     assert!(period_us > 0 && deadline_us < period_us);
-    pac::TIM2::enable(rcc);
-    pac::TIM2::reset(rcc);
-    pac::TIM3::enable(rcc);
-    pac::TIM3::reset(rcc);
-    pac::TIM5::enable(rcc);
-    pac::TIM5::reset(rcc);
-    pac::TIM7::enable(rcc);
-    pac::TIM7::reset(rcc);
-
     // URS everywhere: the forced update that loads the prescaler raises no flag.
     // ARPE: a new period begins when the old one has ended.
     p.tim2
