@@ -10,7 +10,7 @@ use serde::Deserialize;
 
 use crate::cli::MachineOptions;
 use crate::machine::Checked;
-use crate::{cargo, toolchain};
+use crate::{cargo, frame_pointers, toolchain};
 
 /// Where images are kept, each in a folder of its machine: cargo's own place is
 /// taken by the next that is built.
@@ -98,6 +98,7 @@ fn folder(description: &Path) -> String {
 
 fn make(mut command: Command, machine: &str) -> Result<PathBuf> {
     toolchain::ensure_target()?;
+    frame_pointers::leave_out(&mut command);
     let output = command
         .arg("--message-format=json-render-diagnostics")
         .stdin(Stdio::null())

@@ -12,6 +12,7 @@ mod ci;
 mod cli;
 mod conformance;
 mod firmware;
+mod frame_pointers;
 mod image;
 mod interop;
 mod machine;
@@ -30,6 +31,9 @@ use cli::{Cli, Command};
 fn main() -> ExitCode {
     // `| head` closes the pipe: that ends the command, it is no defect to report.
     sigpipe::reset();
+    if let Some(code) = frame_pointers::compiler() {
+        return code;
+    }
     let cli = Cli::parse_or_exit();
     let outcome = match cli.command {
         Command::Run(options) => run::command(&options),
