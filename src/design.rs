@@ -37,18 +37,16 @@ pub const fn tx_queue(axes: usize) -> usize {
 /// at 1 Mbit/s for longer than the millisecond after which the next are made.
 pub const OWN_FRAMES: usize = 10;
 
-/// Changed settings that may wait for `network`, which takes them every
-/// millisecond: a write of 1016h makes one for each node, one for a node outside
-/// the network, and a client has no time for more than four writes (of two frames
-/// of at least 111 bits each at 1 Mbit/s). The rest is the ring's empty place.
-pub const fn order_queue(axes: usize) -> usize {
-    4 * (axes + 2)
-}
-
 /// Frames that may wait for a task, plus one that the ring leaves empty. The
 /// tasks are woken by the first; this is a burst from every node at once.
 pub const fn rx_queue(axes: usize) -> usize {
     4 * (axes + 2)
+}
+
+/// The same of frames of which each node sends one at most before it is answered, and
+/// one that nobody waits for any more: answers to the boot-up, and states.
+pub const fn answer_queue(axes: usize) -> usize {
+    2 * (axes + 2)
 }
 
 /// Reports that may wait for the log.

@@ -27,11 +27,11 @@ mod app {
         control::Control,
         counters::{self, Counts},
         derived::{self, AXES, BUSES},
-        filters, leds,
+        filters, heartbeats, leds,
         lines::{self, Line, Lines, PRODUCING, SYNCS, Sender},
         log::{News, UPTIME_MS},
         measured::{self, Figure},
-        own_node::{Order, OwnNode},
+        own_node::OwnNode,
         reception::{Receiver, States, queue},
         report::{publish, tell},
         roll::{self, Task},
@@ -50,15 +50,15 @@ mod app {
         network::Network,
         nmt,
         sync::SyncCounter,
-        time::{Duration, Instant},
+        time::Instant,
     };
     use core::{mem::MaybeUninit, sync::atomic::Ordering};
     use heapless::spsc::{Consumer, Producer, Queue};
     use nucleo_g474re::{Config, can, pins, timers, watchdog::Watchdog};
 
     type FrameQueue = Queue<Frame, { design::rx_queue(AXES) }>;
+    type AnswerQueue = Queue<Frame, { design::answer_queue(AXES) }>;
     type NewsQueue = Queue<News, { design::log_queue(AXES) }>;
-    type OrderQueue = Queue<Order, { design::order_queue(AXES) }>;
     type EventQueue = Queue<GroupEvent, { design::log_queue(AXES) }>;
 
     pub(crate) static NETWORK: &Network = &derived::NETWORK;
@@ -126,8 +126,6 @@ mod app {
         states_to: Producer<'static, Frame>,
         news_to: Producer<'static, News>,
         heartbeat: nmt::Producer,
-        heartbeat_time: Duration,
-        orders: Consumer<'static, Order>,
         counts: Counts,
         asking: Asking,
         asleep: u32,
@@ -146,11 +144,10 @@ mod app {
         own_place: MaybeUninit<OwnNode> = MaybeUninit::uninit(),
         line_places: [Line; BUSES] = [const { Line::new() }; BUSES],
         network_queue: FrameQueue = Queue::new(),
-        answer_queue: FrameQueue = Queue::new(),
+        answer_queue: AnswerQueue = Queue::new(),
         transfer_queue: FrameQueue = Queue::new(),
-        state_queue: FrameQueue = Queue::new(),
+        state_queue: AnswerQueue = Queue::new(),
         request_queue: FrameQueue = Queue::new(),
-        order_queue: OrderQueue = Queue::new(),
         news_queue: NewsQueue = Queue::new(),
         event_queue: EventQueue = Queue::new(),
     ])]
@@ -164,7 +161,6 @@ mod app {
         let (news_to, news) = cx.local.news_queue.split();
         let (events_to, events) = cx.local.event_queue.split();
         let (requests_to, requests) = cx.local.request_queue.split();
-        let (orders_to, orders) = cx.local.order_queue.split();
         defmt::unwrap!(sdo_configurator::spawn().ok());
         let own = new_own_node(cx.local.own_place);
         let store = own.load(board.storage);
@@ -214,8 +210,6 @@ mod app {
                     states_to,
                     news_to,
                     heartbeat: nmt::Producer::new(NETWORK.master.node),
-                    heartbeat_time: NETWORK.master.heartbeat,
-                    orders,
                     counts: Counts::default(),
                     asking: Asking::default(),
                     asleep: 0,
@@ -234,7 +228,6 @@ mod app {
                     events,
                     own,
                     requests,
-                    orders_to,
                     sync_period: board.sync_period,
                     store,
                 },
@@ -501,15 +494,10 @@ mod app {
         } else {
             0
         });
-        while let Some(order) = local.orders.dequeue() {
-            match order {
-                Order::Heartbeat(time) => local.heartbeat_time = time,
-                Order::Consumer(node, time) => supervisor.set_consumer_time(node, time),
-                Order::Watch(other) => supervisor.watch(other),
-            }
-        }
-        if control.speaking && local.heartbeat.period() != local.heartbeat_time {
-            local.heartbeat.set_period(local.heartbeat_time, now);
+        heartbeats::watch(supervisor);
+        let heartbeat = heartbeats::producer();
+        if control.speaking && local.heartbeat.period() != heartbeat {
+            local.heartbeat.set_period(heartbeat, now);
         }
         if let Some(frame) = local.heartbeat.poll(now, control.state())
             && control.speaking

@@ -8,7 +8,7 @@ use crate::{
     lines::SYNCS,
     log::{self, Log, News},
     modes::Modes,
-    own_node::{Order, OwnNode, Storage},
+    own_node::{OwnNode, Storage},
     roll::{self, Task},
     transfer::{self, Transfer},
     wake,
@@ -23,7 +23,7 @@ use canmaster::{
     time::{Duration, Instant},
 };
 use core::sync::atomic::Ordering::Relaxed;
-use heapless::spsc::{Consumer, Producer};
+use heapless::spsc::Consumer;
 use nucleo_g474re::{
     reset_cause::ResetCause,
     timers::{Microseconds, SyncPeriod},
@@ -48,7 +48,6 @@ pub(crate) struct Parts {
     pub(crate) events: Consumer<'static, GroupEvent>,
     pub(crate) own: &'static mut OwnNode,
     pub(crate) requests: Consumer<'static, Frame>,
-    pub(crate) orders_to: Producer<'static, Order>,
     pub(crate) sync_period: SyncPeriod,
     pub(crate) store: Option<Storage>,
 }

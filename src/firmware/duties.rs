@@ -6,6 +6,7 @@ use crate::{
     asking,
     configurator::Configurator,
     derived::{AXES, CONTROLLERS, RPDOS_US},
+    heartbeats,
     lines::{self, Line, PRODUCING},
     own_node::Mirror,
 };
@@ -84,10 +85,7 @@ impl Configurator<'_> {
             }
             Event::Changed(setting) => {
                 self.take_over(setting);
-                return self.local.own.orders(setting, |order| {
-                    // There is room for the settings of all nodes.
-                    let _ = self.local.orders_to.enqueue(order);
-                });
+                return heartbeats::give(setting, self.local.own.device.settings());
             }
             _ => return,
         };

@@ -23,6 +23,8 @@ mod filters;
 #[cfg(target_os = "none")]
 mod hard_fault;
 #[cfg(target_os = "none")]
+mod heartbeats;
+#[cfg(target_os = "none")]
 mod leds;
 #[cfg(target_os = "none")]
 mod lines;

@@ -9,7 +9,6 @@
 //! too, are off. Reset node and reset communication both start the board anew.
 
 use crate::{
-    asking,
     axes::Axes,
     control::Control,
     derived::{AXES, PDOS, PROGRAM, SYNC_LIMITS, TPDO_EVERY},
@@ -20,7 +19,7 @@ use canmaster::{
     Frame, NodeId,
     boot::{Event, NetworkBoot},
     design,
-    device::{self, Description, Device, Identity, MasterError, Setting, Settings},
+    device::{self, Description, Device, Identity, MasterError},
     emcy::EmcyCode,
     frame::MAX_DATA,
     id::Address,
@@ -66,17 +65,6 @@ const PAGES: [u32; 2] = [
 
 /// How long after an order to start anew the board still answers.
 const LAST_WORDS: Duration = Duration::from_millis(10);
-
-/// What a client has changed that another task has to take over.
-#[derive(Clone, Copy)]
-pub(crate) enum Order {
-    /// 1017h.
-    Heartbeat(Duration),
-    /// 1016h; zero: not watched.
-    Consumer(NodeId, Duration),
-    /// 1016h: a node that the network does not name.
-    Watch(Option<(NodeId, Duration)>),
-}
 
 /// The process data that the object dictionary mirrors: TPDOs as they last came,
 /// and what each axis was last told.
@@ -396,26 +384,6 @@ impl OwnNode {
                 FaultCause::TpdoMissing { .. } => MasterError::PdoMissing { node, tpdo: 0 },
                 _ => MasterError::AxisFault { node, code },
             });
-        }
-    }
-
-    /// What `network` has to know of a changed setting.
-    pub(crate) fn orders(&self, setting: Setting, mut give: impl FnMut(Order)) {
-        let settings: &Settings<AXES> = self.device.settings();
-        match setting {
-            Setting::ProducerHeartbeat => give(Order::Heartbeat(settings.heartbeat())),
-            Setting::ConsumerHeartbeat(_) => {
-                for (axis, node) in self.network.nodes.iter().enumerate() {
-                    let time = settings.consumer_time(node.id);
-                    let time = time.filter(|_| asking::is_watched(axis));
-                    give(Order::Consumer(node.id, time.unwrap_or(Duration::ZERO)));
-                }
-                let mut consumers = settings.consumers();
-                give(Order::Watch(
-                    consumers.find(|(node, _)| self.network.find(*node).is_none()),
-                ));
-            }
-            _ => {}
         }
     }
 }
