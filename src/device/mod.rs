@@ -60,7 +60,7 @@ use crate::sync::SyncLimits;
 use crate::time::{Duration, Instant};
 use crate::time_of_day::{self, TimeOfDay};
 use dictionary::Dictionary;
-use node_record::Presence;
+use node_record::{NodeRecord, Presence};
 use own_tpdo::OwnTpdos;
 use view::View;
 
@@ -213,7 +213,7 @@ impl<const N: usize> Device<N> {
                 status: 0,
                 axes_enabled: false,
                 clock: time_of_day::Clock::new(),
-                nodes: core::array::from_fn(|_| Default::default()),
+                nodes: [const { NodeRecord::NONE }; N],
                 transfer: TransferTest::NONE,
                 own_tpdos: OwnTpdos::new(description.tpdo_every),
                 events: heapless::Deque::new(),

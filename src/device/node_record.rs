@@ -9,7 +9,7 @@ use crate::nmt::State;
 pub(super) const HISTORY: usize = 4;
 
 /// How far the boot-up of a node is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct NodeStatus {
     words: Words,
     /// The error status of CiA 302-2 as an ASCII letter; 0 for none.
@@ -22,11 +22,10 @@ pub(super) struct NodeStatus {
 
 /// What is told of a node, by the number of its text. Of a failure without its facts:
 /// those are in the log, whose words take no room in the device.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 enum Words {
     /// The network has not been started yet.
-    #[default]
     Idle,
     /// Its boot-up frame is awaited.
     Awaited,
@@ -64,9 +63,17 @@ const BOOT_STATUS: u8 = NO_EMERGENCY + 1;
 const WRITES: u8 = BOOT_STATUS + 1;
 
 impl NodeStatus {
+    /// The network was not started.
+    const NONE: NodeStatus = NodeStatus {
+        words: Words::Idle,
+        letter: 0,
+        done: 0,
+        total: 0,
+    };
+
     /// The status after a step of the boot-up that concerns this node.
     pub(super) fn after(event: &Event) -> Option<NodeStatus> {
-        let mut status = NodeStatus::default();
+        let mut status = NodeStatus::NONE;
         status.words = match *event {
             Event::ResetSent => Words::Awaited,
             Event::BootUp(_) => Words::Identifying,
@@ -136,15 +143,24 @@ const fn words(cause: &Cause) -> Words {
 }
 
 /// What is known of one node.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct NodeRecord {
     pub(super) status: NodeStatus,
     pub(super) presence: Presence,
     pub(super) emcy: History<Emcy, HISTORY>,
 }
 
+impl NodeRecord {
+    /// Nothing.
+    pub(super) const NONE: NodeRecord = NodeRecord {
+        status: NodeStatus::NONE,
+        presence: Presence::UNKNOWN,
+        emcy: History::new(),
+    };
+}
+
 /// What error control hears of the node, as 1F82h has it (CiA 302-2).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Presence(pub(super) u8);
 
 impl Presence {
