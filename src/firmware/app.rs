@@ -44,7 +44,7 @@ mod app {
         id::{CobId, FunctionCode},
         master::{AxisMap, Debounce, ExtendedClock, MasterOd, Supervisor},
         motion::{
-            AxisCommand, Director, Group, GroupEvent,
+            AxisCommand, Director, Group,
             panel::{PROGRAM_BYTES, Panel},
         },
         network::Network,
@@ -59,7 +59,6 @@ mod app {
     type FrameQueue = Queue<Frame, { design::rx_queue(AXES) }>;
     type AnswerQueue = Queue<Frame, { design::answer_queue(AXES) }>;
     type NewsQueue = Queue<News, { design::log_queue(AXES) }>;
-    type EventQueue = Queue<GroupEvent, { design::log_queue(AXES) }>;
 
     pub(crate) static NETWORK: &Network = &derived::NETWORK;
     pub(crate) static CLOCK: ExtendedClock = ExtendedClock::new();
@@ -95,6 +94,7 @@ mod app {
         clock_us: timers::Microseconds,
         commands: [AxisCommand; AXES],
         axes: &'static mut Axes,
+        counts: Counts,
     }
 
     #[local]
@@ -110,7 +110,6 @@ mod app {
 
     struct ProducerParts {
         deadline: timers::Deadline,
-        events_to: Producer<'static, GroupEvent>,
     }
 
     struct NetworkParts {
@@ -126,7 +125,6 @@ mod app {
         states_to: Producer<'static, Frame>,
         news_to: Producer<'static, News>,
         heartbeat: nmt::Producer,
-        counts: Counts,
         asking: Asking,
         asleep: u32,
         known_bus: can::ErrorState,
@@ -149,7 +147,6 @@ mod app {
         state_queue: AnswerQueue = Queue::new(),
         request_queue: FrameQueue = Queue::new(),
         news_queue: NewsQueue = Queue::new(),
-        event_queue: EventQueue = Queue::new(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
         let board = nucleo_g474re::setup::<{ derived::CAN }>(cx.device, &BOARD);
@@ -159,7 +156,6 @@ mod app {
         let (transfer_to, transfer_answers) = cx.local.transfer_queue.split();
         let (states_to, states) = cx.local.state_queue.split();
         let (news_to, news) = cx.local.news_queue.split();
-        let (events_to, events) = cx.local.event_queue.split();
         let (requests_to, requests) = cx.local.request_queue.split();
         defmt::unwrap!(sdo_configurator::spawn().ok());
         let own = new_own_node(cx.local.own_place);
@@ -189,12 +185,12 @@ mod app {
                 clock_us: board.microseconds,
                 commands: [AxisCommand::default(); AXES],
                 axes: new_axes(cx.local.group, cx.local.axes_place),
+                counts: Counts::default(),
             },
             Local {
                 period: board.period,
                 producer: ProducerParts {
                     deadline: board.deadline,
-                    events_to,
                 },
                 supervisor: Supervisor::new(NETWORK),
                 network: NetworkParts {
@@ -210,7 +206,6 @@ mod app {
                     states_to,
                     news_to,
                     heartbeat: nmt::Producer::new(NETWORK.master.node),
-                    counts: Counts::default(),
                     asking: Asking::default(),
                     asleep: 0,
                     known_bus: can::ErrorState::Active,
@@ -225,7 +220,6 @@ mod app {
                     transfer_answers,
                     states,
                     news,
-                    events,
                     own,
                     requests,
                     sync_period: board.sync_period,
@@ -400,7 +394,6 @@ mod app {
         };
         let control = cx.shared.control.lock(Control::take);
         let deadline = &mut local.deadline;
-        let events_to = &mut local.events_to;
         let shared = &mut cx.shared;
         // Their ceiling is the priority of this task: nobody waits for them.
         let mut theirs = (&mut shared.control, &mut shared.commands, &mut shared.axes);
@@ -420,13 +413,7 @@ mod app {
                     measured::give(Figure::Cycle, shared.phase.elapsed_us());
                 }
             }
-            while let Some(event) = axes.take_event() {
-                if events_to.enqueue(event).is_err() {
-                    counters::LOG_FULL.add(1);
-                }
-                wake::want();
-            }
-            if axes.moves() || axes.pressed {
+            if axes.group.has_events() || axes.moves() || axes.pressed {
                 wake::want();
             }
         });
@@ -448,7 +435,7 @@ mod app {
         binds = TIM7,
         priority = 2,
         local = [network, supervisor],
-        shared = [od, lines, control, states, &phase]
+        shared = [od, lines, control, states, counts, &phase]
     )]
     fn network(mut cx: network::Context) {
         let network::LocalResources {
@@ -529,9 +516,13 @@ mod app {
                 publish(&mut local.news_to, News::Measured);
             }
             let counts = Counts::now(overruns, wrong_length, overflows);
-            if counts != local.counts {
-                local.counts = counts;
-                publish(&mut local.news_to, News::Counts(counts));
+            let new = cx.shared.counts.lock(|last| {
+                let new = counts != *last;
+                *last = counts;
+                new
+            });
+            if new {
+                publish(&mut local.news_to, News::Counts);
             }
         }
         wake::if_due(counter);
@@ -552,7 +543,7 @@ mod app {
     #[task(
         priority = 1,
         local = [configurator],
-        shared = [od, sender, lines, control, commands, axes]
+        shared = [od, sender, lines, control, commands, axes, counts]
     )]
     async fn sdo_configurator(cx: sdo_configurator::Context) {
         let mut wake = wake::reader();

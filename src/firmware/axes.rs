@@ -10,8 +10,7 @@ use canmaster::{
     design,
     master::{Cycle, MasterOd, Overload, Ramps, TpdoSlot},
     motion::{
-        AxisCommand, AxisFeedback, FaultCause, Group, GroupEvent, GroupState, Inputs, Order,
-        Speedometer,
+        AxisCommand, AxisFeedback, FaultCause, Group, GroupState, Inputs, Order, Speedometer,
     },
     network::Network,
 };
@@ -126,11 +125,6 @@ impl Axes {
                 && StatusWord(feedback.statusword).state().is_enabled()
         };
         led || self.feedback.iter().enumerate().any(is)
-    }
-
-    /// What the group has to report.
-    pub(crate) fn take_event(&mut self) -> Option<GroupEvent> {
-        self.group.take_event()
     }
 
     /// It is too late for the RPDOs of this cycle.

@@ -45,7 +45,6 @@ pub(crate) struct Parts {
     pub(crate) transfer_answers: Consumer<'static, Frame>,
     pub(crate) states: Consumer<'static, Frame>,
     pub(crate) news: Consumer<'static, News>,
-    pub(crate) events: Consumer<'static, GroupEvent>,
     pub(crate) own: &'static mut OwnNode,
     pub(crate) requests: Consumer<'static, Frame>,
     pub(crate) sync_period: SyncPeriod,
@@ -149,14 +148,15 @@ impl<'a> Configurator<'a> {
     fn direct(&mut self) {
         let director = &mut *self.local.director;
         let panel = &mut *self.local.panel;
-        let (refused, plan) = self.shared.axes.lock(|axes| {
-            let refused = match core::mem::take(&mut axes.pressed) {
-                true => director.run(axes.group).err(),
-                false => None,
-            };
+        let plan = self.shared.axes.lock(|axes| {
+            if core::mem::take(&mut axes.pressed)
+                && let Err(why) = director.run(axes.group)
+            {
+                axes.group.report(GroupEvent::ReleaseRefused(why));
+            }
             panel.poll(axes.group);
             let program = panel.program().unwrap_or(PROGRAM.as_slice());
-            (refused, director.look(axes.group, program))
+            director.look(axes.group, program)
         });
         let program = panel.program().unwrap_or(PROGRAM.as_slice());
         if plan {
@@ -165,16 +165,13 @@ impl<'a> Configurator<'a> {
                 .axes
                 .lock(|axes| director.act(axes.group, program));
         }
-        let refused = refused.map(GroupEvent::ReleaseRefused);
-        for event in [refused, director.take_event()].into_iter().flatten() {
-            self.log.group(&event);
-        }
     }
 
     /// What the other tasks have to say. `true`: the controller is bus-off.
     fn listen(&mut self) -> bool {
         let now = self.now();
         let local = &mut self.local;
+        let counts = self.shared.counts.lock(|counts| *counts);
         while let Some(news) = local.news.dequeue() {
             if let Some(node) = news.cut_off_node() {
                 local.boot.node_cut_off(node, now);
@@ -182,11 +179,11 @@ impl<'a> Configurator<'a> {
             // Who is just being booted has to be silent for a while.
             let lost = news.lost_node();
             if lost.is_none_or(|node| local.boot.node_lost(node)) {
-                local.own.news(&news);
-                self.log.news(&news);
+                local.own.news(&news, &counts);
+                self.log.news(&news, &counts);
             }
         }
-        while let Some(event) = local.events.dequeue() {
+        while let Some(event) = self.shared.axes.lock(|axes| axes.group.take_event()) {
             self.silent.group(&event, local.boot);
             local.own.group(&event);
             local.panel.on_event(&event);

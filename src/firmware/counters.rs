@@ -41,8 +41,9 @@ pub(crate) static ANSWERS: Counter = Counter::new();
 pub(crate) static LOG_FULL: Counter = Counter::new();
 
 /// All counts at one moment.
+#[expect(unreachable_pub, reason = "RTIC wants shared resources to be public")]
 #[derive(Clone, Copy, Default, PartialEq, Eq)]
-pub(crate) struct Counts {
+pub struct Counts {
     pub(crate) sync_not_sent: u32,
     pub(crate) rpdo_replaced: u32,
     /// Cycles that `pdo_producer` did not take up before the next SYNC.

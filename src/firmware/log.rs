@@ -149,7 +149,8 @@ pub(crate) fn started(cause: ResetCause, silence_ms: u32, stored: bool) {
 pub(crate) enum News {
     Node(Report),
     ErrorState(ErrorState),
-    Counts(Counts),
+    /// The counts have changed.
+    Counts,
     /// A second is over.
     Measured,
 }
@@ -170,12 +171,15 @@ impl News {
     /// A node that has missed the bus or the master while it was being booted. A
     /// drive leaves that error by a reset of its communication alone.
     pub(crate) fn cut_off_node(&self) -> Option<NodeId> {
-        match *self {
-            News::Node(Report {
-                notice: Notice::Emcy { node, emcy },
-                fault: None,
-                ..
-            }) if matches!(emcy.code, EmcyCode::ERROR_PASSIVE | EmcyCode::HEARTBEAT) => Some(node),
+        let News::Node(report) = self else {
+            return None;
+        };
+        match report.notice {
+            Notice::Emcy { node, emcy }
+                if matches!(emcy.code, EmcyCode::ERROR_PASSIVE | EmcyCode::HEARTBEAT) =>
+            {
+                report.fault().is_none().then_some(node)
+            }
             _ => None,
         }
     }
@@ -223,10 +227,10 @@ impl Log {
 
     /// What `network` had to say.
     #[inline(never)]
-    pub(crate) fn news(&mut self, news: &News) {
+    pub(crate) fn news(&mut self, news: &News, counts: &Counts) {
         let (level, line) = match news {
             News::Node(report) => return self.report(report),
-            News::Counts(counts) => (Level::Warning, Line::Counts(counts)),
+            News::Counts => (Level::Warning, Line::Counts(counts)),
             News::Measured => {
                 let [jitter, cycle, step, bus, cpu, overruns] =
                     [1, 3, 6, 8, 9, 10].map(measured::entry);
@@ -249,7 +253,7 @@ impl Log {
         let notice = &report.notice;
         let (level, line) = if report.axis.is_none() {
             (Level::Warning, Line::Foreign(notice))
-        } else if report.fault.is_some() {
+        } else if report.fault().is_some() {
             (self.fault(), Line::Advised(notice))
         } else {
             (Level::Warning, Line::Notice(notice))

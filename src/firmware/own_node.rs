@@ -11,6 +11,7 @@
 use crate::{
     axes::Axes,
     control::Control,
+    counters::Counts,
     derived::{AXES, PDOS, PROGRAM, SYNC_LIMITS, TPDO_EVERY},
     log::News,
     measured,
@@ -306,7 +307,7 @@ impl OwnNode {
 
     /// What `network` had to say.
     #[inline(never)]
-    pub(crate) fn news(&mut self, news: &News) {
+    pub(crate) fn news(&mut self, news: &News, counts: &Counts) {
         match news {
             News::Node(report) => match report.notice {
                 Notice::Emcy { node, emcy } => self.device.on_emcy(node, emcy),
@@ -320,7 +321,7 @@ impl OwnNode {
             },
             News::ErrorState(state) => self.error_state(*state),
             News::Measured => {}
-            News::Counts(counts) => {
+            News::Counts => {
                 let lost = counts.rx_overruns.wrapping_add(counts.rx_queue_full);
                 if lost != self.lost_frames {
                     self.lost_frames = lost;

@@ -10,8 +10,8 @@ pub(crate) fn tell(
     news: &mut Producer<'static, News>,
     control: &mut impl rtic::Mutex<T = Control>,
 ) {
-    if let (Some(axis), Some(cause)) = (report.axis, report.fault) {
-        control.lock(|control| control.tell_fault(axis, cause));
+    if let (Some(axis), Some(cause)) = (report.axis, report.fault()) {
+        control.lock(|control| control.tell_fault(axis.into(), cause));
     }
     publish(news, News::Node(report));
 }

@@ -58,7 +58,7 @@ impl Notice {
     }
 
     /// Why a running group has to stop for it, if it has.
-    const fn fault(&self) -> Option<FaultCause> {
+    pub const fn fault(&self) -> Option<FaultCause> {
         match self {
             Notice::Emcy { emcy, .. } => match emcy.code.class() {
                 Class::Reset | Class::Warning => None,
@@ -128,14 +128,21 @@ in_words!(Advice {
 /// A notice, and the axis that it is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Report {
-    /// Counted from 0; `None` for a node that the network does not name.
-    pub axis: Option<usize>,
     /// What happened.
     pub notice: Notice,
+    /// Counted from 0; `None` for a node that the network does not name.
+    pub axis: Option<u8>,
+    /// The node has to be operational.
+    armed: bool,
+}
+
+impl Report {
     /// Why the group has to stop for it. `None` if it need not, and while the
     /// node need not be operational: what a drive says then, as that it missed
     /// the master while that was reset, is overcome by its boot-up.
-    pub fault: Option<FaultCause>,
+    pub fn fault(&self) -> Option<FaultCause> {
+        self.notice.fault().filter(|_| self.armed)
+    }
 }
 
 #[derive(Debug)]
@@ -264,12 +271,10 @@ impl<const N: usize> Supervisor<N> {
 
     fn report(&self, axis: Option<usize>, notice: Notice) -> Report {
         let watched = axis.and_then(|axis| self.nodes.get(axis));
-        let armed = watched.is_some_and(|watched| watched.armed);
-        let fault = if armed { notice.fault() } else { None };
         Report {
-            axis,
             notice,
-            fault,
+            axis: axis.map(|axis| axis as u8),
+            armed: watched.is_some_and(|watched| watched.armed),
         }
     }
 }
@@ -379,7 +384,7 @@ mod tests {
         let emcy = Emcy::new(EmcyCode::GENERIC, ErrorRegister::GENERIC);
         let frame = emcy.frame(NodeId::constant::<99>());
         let report = supervisor.on_frame(&frame, at(300)).unwrap();
-        assert_eq!((report.axis, report.fault), (None, None));
+        assert_eq!((report.axis, report.fault()), (None, None));
     }
 
     #[test]
@@ -393,7 +398,7 @@ mod tests {
         assert_eq!(supervisor.on_frame(&beat, at(300)), None);
         assert_eq!(supervisor.poll(at(399)), None);
         let lost = supervisor.poll(at(400)).unwrap();
-        assert_eq!((lost.axis, lost.fault), (None, None));
+        assert_eq!((lost.axis, lost.fault()), (None, None));
         assert_eq!(lost.notice.node(), OTHER);
         let back = supervisor.on_frame(&beat, at(410)).unwrap();
         assert_eq!(back.notice, Notice::HeartbeatBack(OTHER));
@@ -406,11 +411,11 @@ mod tests {
         let mut supervisor = Supervisor::<6>::new(&SIX_EPOS4);
         let emcy = Emcy::new(EmcyCode::HEARTBEAT, ErrorRegister::COMMUNICATION);
         let report = supervisor.on_frame(&emcy.frame(NODE), at(0)).unwrap();
-        assert_eq!(report.fault, None);
+        assert_eq!(report.fault(), None);
         supervisor.on_frame(&heartbeat(State::PreOperational), at(100));
         let report = supervisor.poll(at(400)).unwrap();
         assert!(matches!(report.notice, Notice::HeartbeatLost(_)));
-        assert_eq!(report.fault, None);
+        assert_eq!(report.fault(), None);
     }
 
     #[test]
@@ -428,11 +433,11 @@ mod tests {
         // Its own loss is told all the same, so that it is booted again.
         let report = supervisor.poll(at(750)).unwrap();
         assert!(matches!(report.notice, Notice::HeartbeatLost(_)));
-        assert_eq!(report.fault, None);
+        assert_eq!(report.fault(), None);
         // The others are watched as before.
         let other = ErrorControl::heartbeat(NodeId::constant::<5>(), State::PreOperational);
         let report = supervisor.on_frame(&other.frame(), at(760)).unwrap();
-        assert_eq!(report.fault, Some(FaultCause::LeftOperational));
+        assert_eq!(report.fault(), Some(FaultCause::LeftOperational));
     }
 
     #[test]

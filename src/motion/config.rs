@@ -2,7 +2,7 @@
 
 use crate::motion::mode::Mode;
 use crate::motion::position_control::Tuning;
-use crate::motion::program::{Fault, PlanError};
+use crate::motion::program::{Reason, Refusal};
 use crate::motion::scale::Scale;
 use crate::time::Duration;
 
@@ -37,14 +37,11 @@ impl AxisConfig {
     ///
     /// # Errors
     /// With the end that is passed.
-    pub(in crate::motion) fn reaches(&self, axis: u8, target: i32) -> Result<(), PlanError> {
+    pub(in crate::motion) fn reaches(&self, axis: u8, target: i32) -> Result<(), Refusal> {
         let (lower, upper) = self.travel;
         let end = if target < 0 { lower } else { upper };
         if target.unsigned_abs() > end.unsigned_abs() {
-            return Err(PlanError {
-                axis,
-                ..PlanError::whole(Fault::Target, target as u32, end as u32)
-            });
+            return Err(Refusal::of(axis, Reason::Target, target as u32, end as u32));
         }
         Ok(())
     }

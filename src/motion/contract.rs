@@ -109,8 +109,6 @@ pub fn cell(state: GroupState, event: Event) -> Cell {
     match code {
         None | Some(&O) => Cell::Stay,
         Some(&X) => Cell::Refuse,
-        Some(&state) => GroupState::ALL
-            .get(usize::from(state))
-            .map_or(Cell::Stay, |to| Cell::Go(*to)),
+        Some(&state) => Cell::Go(GroupState::of(state)),
     }
 }

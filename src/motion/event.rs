@@ -2,7 +2,7 @@
 
 use crate::cia402::{State, StatusWord, Timeout};
 use crate::motion::mode::Mode;
-use crate::motion::program::PlanError;
+use crate::motion::program::Refusal;
 use crate::words::in_words;
 
 /// State of a group of axes.
@@ -51,6 +51,12 @@ impl GroupState {
         GroupState::FaultStop,
         GroupState::Faulted,
     ];
+
+    /// The state of this number in 2001h; idle if there is none.
+    pub(super) fn of(number: u8) -> GroupState {
+        let state = GroupState::ALL.get(usize::from(number));
+        state.copied().unwrap_or(GroupState::Idle)
+    }
 }
 
 in_words!(GroupState {
@@ -176,70 +182,6 @@ in_words!(FaultCause {
     ),
 });
 
-/// Why a release was not accepted. Nothing has been sent because of it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Refusal {
-    /// A release counts in standby only.
-    NotInStandby(GroupState),
-    /// A stop was requested in the same cycle.
-    StopRequested,
-    /// The axis' TPDO of this cycle is missing.
-    NotFresh {
-        /// Counted from 0.
-        axis: u8,
-    },
-    /// The axis is turning.
-    NotAtRest {
-        /// Counted from 0.
-        axis: u8,
-        /// rpm, from 606Ch.
-        velocity: i32,
-    },
-    /// The program breaks a limit.
-    Program(PlanError),
-    /// The order does not count in this state of the group.
-    NotIn(GroupState),
-    /// The network is not ready.
-    NetworkNotReady,
-    /// The axis is in another mode of operation.
-    WrongMode {
-        /// Counted from 0.
-        axis: u8,
-        /// Its mode.
-        mode: Mode,
-    },
-    /// The drive does not have the mode.
-    ModeNotSupported {
-        /// Counted from 0.
-        axis: u8,
-        /// What was asked for.
-        mode: Mode,
-        /// What it has, as 6502h.
-        supported: u32,
-    },
-    /// The last command is not carried out yet.
-    Busy,
-}
-
-in_words!(Refusal {
-    Refusal::NotInStandby(state) => ("the group is {}, not in standby", state),
-    Refusal::StopRequested => ("a stop was requested at the same time"),
-    Refusal::NotFresh { axis } => ("axis {}: no TPDO in this cycle", axis + 1),
-    Refusal::NotAtRest { axis, velocity } => (
-        "axis {}: still turning at {} rpm", axis + 1, velocity
-    ),
-    Refusal::Program(error) => ("{}", error),
-    Refusal::NotIn(state) => ("not while the group is {}", state),
-    Refusal::NetworkNotReady => ("the network is not ready"),
-    Refusal::WrongMode { axis, mode } => ("axis {}: it is in mode \"{}\"", axis + 1, mode),
-    Refusal::ModeNotSupported { axis, mode, supported } => (
-        "axis {}: the drive does not have mode \"{}\", only those of 6502h = {:#x}",
-        axis + 1, mode, supported
-    ),
-    Refusal::Busy => ("the last command is not carried out yet"),
-});
-
 /// Something that happened in a step, for the log. Axes are counted from 0 and
 /// shown from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -278,9 +220,9 @@ pub enum GroupEvent {
     /// The program ran through; the group is in standby again.
     ProgramDone,
     /// The program cannot go on; the group stops.
-    ProgramFailed(PlanError),
+    ProgramFailed(Refusal),
     /// A move cannot be made; what was commanded before goes on.
-    MoveRefused(PlanError),
+    MoveRefused(Refusal),
     /// A fault stops the group, or came on top of one.
     Fault {
         /// Counted from 0; `None` where no single axis is the cause.
@@ -320,7 +262,7 @@ in_words!(GroupEvent {
         "axis {}: arrived at {}, error {}", axis + 1, target, error
     ),
     GroupEvent::ProgramDone => ("program done"),
-    GroupEvent::ProgramFailed(error) => ("program stopped: {}", error),
+    GroupEvent::ProgramFailed(error) => ("program stopped in step {}: {}", error.step, error),
     GroupEvent::MoveRefused(error) => ("move refused: {}", error),
     GroupEvent::Fault { axis: Some(axis), cause } => ("axis {}: {}", axis + 1, cause),
     GroupEvent::Fault { axis: None, cause } => ("{}", cause),

@@ -29,13 +29,24 @@ mod scale;
 mod speedometer;
 pub mod units;
 
+/// Takes the first out of a set: bit n for n.
+fn next(set: &mut u32) -> Option<usize> {
+    let first = set.trailing_zeros();
+    *set &= set.wrapping_sub(1);
+    (first < u32::BITS).then_some(first as usize)
+}
+
+fn greater(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
 pub use config::{AxisConfig, GroupConfig};
 pub use director::{Director, format};
-pub use event::{FaultCause, GroupEvent, GroupState, Refusal};
+pub use event::{FaultCause, GroupEvent, GroupState};
 pub use group::{
     AxisCommand, AxisFeedback, AxisView, Group, Inputs, ModeWanted, Order, SetPoint, TooLate,
 };
 pub use position_control::{PositionControl, Tuning, Window};
-pub use program::{AxisMove, Fault, PlanError};
+pub use program::{AxisMove, Reason, Refusal};
 pub use scale::Scale;
 pub use speedometer::Speedometer;

@@ -6,13 +6,13 @@
 //! | bits of 2002h | |
 //! |---|---|
 //! | 31..24 | axis, counted from 1; FFh: none |
-//! | 23..16 | reason, see [`Panel`] |
+//! | 23..16 | [`Reason`] |
 //! | 15..0 | detail |
 
 use super::mode::Mode;
-use super::program::AxisMove;
 use super::{
-    Director, FaultCause, Group, GroupConfig, GroupEvent, GroupState, Order, PlanError, Refusal,
+    AxisMove, Director, FaultCause, Group, GroupConfig, GroupEvent, GroupState, Order, Reason,
+    Refusal,
 };
 use crate::id::Address;
 use crate::od::Part;
@@ -58,47 +58,9 @@ pub const STEP: u16 = 0x2010;
 pub const PROGRAM_BYTES: usize = 512;
 /// The longest that a search for home, ordered by 2000h, may take.
 const HOMING: Duration = Duration::from_millis(60_000);
-/// No axis.
-const NONE: u8 = u8::MAX;
 
-/// Why a command was refused: bits 23..16 of 2002h.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-enum Reason {
-    /// The state of the group forbids it; detail: the state.
-    State = 1,
-    /// No TPDO of the axis in this cycle.
-    NotFresh = 2,
-    /// The axis turns; detail: rpm.
-    NotAtRest = 3,
-    /// The network is not ready.
-    Network = 4,
-    /// The axis is in another mode; detail: its mode.
-    WrongMode = 5,
-    /// The drive does not have the mode (6502h); detail: the mode.
-    NoSuchMode = 6,
-    /// The last command is not carried out yet.
-    Busy = 7,
-    /// There is no such command or axis; detail: what was written.
-    Unknown = 8,
-}
-
-impl Reason {
-    /// Whether another value would have been taken.
-    const fn of_the_value(reason: u8) -> bool {
-        reason == Reason::NoSuchMode as u8 || reason == Reason::Unknown as u8
-    }
-}
-
-/// Reasons from here on are a [`Fault`](super::Fault) of a move or of a program.
-const FAULTS: u8 = 16;
-
-/// What clients have set, and what they are told. Reasons of refusals (2002h): 1 not in
-/// this state of the group (detail: the state), 2 no TPDO of the axis, 3 the axis turns
-/// (rpm), 4 network not ready, 5 axis in another mode (its mode), 6 the drive lacks the
-/// mode (the mode), 7 the last command is not carried out yet, 8 no such command or axis
-/// (what was written), 16 and above a move or program that cannot be made: the number of its
-/// [`Fault`](super::Fault) above 16 (of a program the step, else the low bits of the value).
+/// What clients have set, and what they are told: of refusals (2002h) the
+/// [`Reason`] and, as detail, the value, or the step of a program.
 #[derive(Debug)]
 pub struct Panel<const N: usize> {
     config: &'static GroupConfig<N>,
@@ -170,19 +132,19 @@ impl<const N: usize> Panel<N> {
     }
 
     fn of_axis(&self, index: u16, axis: usize, group: &Group<N>) -> u32 {
-        let (Some(part), Some(view)) = (self.moves.get(axis), group.view(axis)) else {
+        let (Some(part), Some(of)) = (self.moves.get(axis), group.axis(axis)) else {
             return 0;
         };
         let signed = match index {
             TARGET => part.target,
             VELOCITY => return part.velocity,
             ACCELERATION => return part.acceleration,
-            MODE => view.mode.code().into(),
-            POSITION => view.feedback.position,
-            ACTUAL_VELOCITY => view.feedback.velocity,
-            REFERENCE => view.reference,
-            FOLLOWING_ERROR => view.following_error,
-            STATUSWORD => return view.feedback.statusword.into(),
+            MODE => of.mode() as i32,
+            POSITION => of.feedback.position,
+            ACTUAL_VELOCITY => of.feedback.velocity,
+            REFERENCE => of.head(),
+            FOLLOWING_ERROR => of.error(),
+            STATUSWORD => of.feedback.statusword.into(),
             _ => return self.faults.get(axis).copied().unwrap_or(0),
         };
         signed as u32
@@ -199,32 +161,47 @@ impl<const N: usize> Panel<N> {
         group: &mut Group<N>,
         director: &mut Director<N>,
     ) -> Result<(), AbortCode> {
+        let done = self.put(at, value, group, director);
+        self.note(done)
+    }
+
+    fn put(
+        &mut self,
+        at: Address,
+        value: u32,
+        group: &mut Group<N>,
+        director: &mut Director<N>,
+    ) -> Result<(), Refusal> {
         let axis = usize::from(at.sub.0).wrapping_sub(1);
         match at.index.0 {
             COMMAND => {
-                let done = self.order(value, group, director);
-                self.note(done)?;
+                self.order(value, group, director)?;
                 self.command = value as u8;
-                return Ok(());
             }
-            AXES if value & !Self::ALL == 0 => self.axes = value,
-            AXES => return self.note(Err(Refused::new(NONE, Reason::Unknown, value))),
+            AXES => {
+                if value & !Self::ALL != 0 {
+                    return Err(Refusal::whole(Reason::Unknown, value, Self::ALL));
+                }
+                self.axes = value;
+            }
             JERK => self.jerk = value,
-            MODE => {
-                let modes = self.config.axes.get(axis).map_or(0, |axis| axis.modes);
-                let mode = Mode::of(value as i8).filter(|mode| mode.is_in(modes));
-                let (Some(mode), Some(place)) = (mode, self.modes.get_mut(axis)) else {
-                    let code = u32::from(value as u8);
-                    return self.note(Err(Refused::new(axis as u8, Reason::NoSuchMode, code)));
-                };
-                *place = mode;
-            }
             index => {
-                if let Some(part) = self.moves.get_mut(axis) {
-                    match index {
-                        TARGET => part.target = value as i32,
-                        VELOCITY => part.velocity = value,
-                        _ => (part.acceleration, part.deceleration) = (value, value),
+                let of = (self.moves.get_mut(axis), self.config.axes.get(axis));
+                let (Some(part), Some(limits)) = of else {
+                    return Ok(());
+                };
+                match index {
+                    TARGET => part.target = value as i32,
+                    VELOCITY => part.velocity = value,
+                    ACCELERATION => (part.acceleration, part.deceleration) = (value, value),
+                    _ => {
+                        let mode = Mode::of(value as i8).filter(|mode| mode.is_in(limits.modes));
+                        let (Some(mode), Some(place)) = (mode, self.modes.get_mut(axis)) else {
+                            let code = u32::from(value as u8);
+                            let reason = Reason::NoSuchMode;
+                            return Err(Refusal::of(axis as u8, reason, code, limits.modes));
+                        };
+                        *place = mode;
                     }
                 }
             }
@@ -237,9 +214,10 @@ impl<const N: usize> Panel<N> {
         command: u32,
         group: &mut Group<N>,
         director: &mut Director<N>,
-    ) -> Result<(), Refused> {
+    ) -> Result<(), Refusal> {
+        const LAST: u32 = 12;
         let (axes, state) = (self.axes, group.state());
-        let order = match command {
+        group.order(match command {
             0 => return Ok(()),
             1 => Order::Enable,
             2 => Order::Disable,
@@ -252,38 +230,23 @@ impl<const N: usize> Panel<N> {
                 axes,
                 limit: self.config.cycles(HOMING),
             },
-            9 => {
-                if state != GroupState::Standby {
-                    return Err(Refusal::NotIn(state).into());
-                }
+            9 if state == GroupState::Standby => {
                 self.changing = axes;
                 return self.change_modes(group);
             }
-            10 => {
-                let parts = core::array::from_fn(|n| {
-                    let part = self.moves.get(n).copied();
-                    part.filter(|_| axes >> n & 1 != 0)
-                });
-                return Ok(director.go(group, &parts, false, self.jerk)?);
+            10 => return director.go(group, axes, &self.moves, self.jerk),
+            // 11 where the group is released already, 12 where it is not.
+            11 | LAST if !self.loading && (command == LAST) != (state == GroupState::Moving) => {
+                return director.run(group);
             }
-            11 | 12 => {
-                // 11 where the group is released already, 12 where it is not.
-                if self.loading || (command == 11) != (state == GroupState::Moving) {
-                    return Err(Refusal::NotIn(state).into());
-                }
-                return Ok(match command {
-                    11 => director.start(group),
-                    _ => director.run(group),
-                }?);
-            }
-            _ => return Err(Refused::new(NONE, Reason::Unknown, command)),
-        };
-        Ok(group.order(order)?)
+            9..=LAST => return Err(Refusal::not_in(state)),
+            _ => return Err(Refusal::whole(Reason::Unknown, command, LAST)),
+        })
     }
 
     /// Orders the modes that are still to be changed: those of one kind together, one
     /// kind after the other.
-    fn change_modes(&mut self, group: &mut Group<N>) -> Result<(), Refused> {
+    fn change_modes(&mut self, group: &mut Group<N>) -> Result<(), Refusal> {
         let first = self.changing.trailing_zeros() as usize;
         let Some(&mode) = self.modes.get(first) else {
             return Ok(());
@@ -294,15 +257,13 @@ impl<const N: usize> Panel<N> {
                 axes |= self.changing & 1 << n;
             }
         }
-        match group.order(Order::SetMode { axes, mode }) {
+        let done = group.order(Order::SetMode { axes, mode });
+        match done {
             Ok(()) => self.changing &= !axes,
-            Err(Refusal::Busy) => {}
-            Err(why) => {
-                self.changing = 0;
-                return Err(why.into());
-            }
+            Err(why) if why.reason == Reason::Busy => return Ok(()),
+            Err(_) => self.changing = 0,
         }
-        Ok(())
+        done
     }
 
     /// Goes on with what takes several steps of the group.
@@ -353,7 +314,7 @@ impl<const N: usize> Panel<N> {
         director: &Director<N>,
     ) -> Result<(), AbortCode> {
         if state != GroupState::Standby || director.step() != 0 {
-            return self.note(Err(Refusal::NotIn(state).into()));
+            return self.note(Err(Refusal::not_in(state)));
         }
         self.length = 0;
         self.loading = true;
@@ -370,7 +331,7 @@ impl<const N: usize> Panel<N> {
             self.loading = false;
             let bytes = self.program.get(..to).unwrap_or_default();
             let checked = super::format::check(bytes, self.config);
-            self.note(checked.map_err(Refused::of))?;
+            self.note(checked)?;
             self.length = to;
         }
         Ok(())
@@ -382,65 +343,23 @@ impl<const N: usize> Panel<N> {
     }
 
     /// Keeps the reason of a refusal.
-    fn note(&mut self, done: Result<(), Refused>) -> Result<(), AbortCode> {
-        done.map_err(|refused| {
-            self.refusal = refused.why;
-            refused.code
+    #[inline(never)]
+    fn note(&mut self, done: Result<(), Refusal>) -> Result<(), AbortCode> {
+        let Err(why) = done else { return Ok(()) };
+        let axis = match why.axis {
+            Refusal::NO_AXIS => Refusal::NO_AXIS,
+            axis => axis + 1,
+        };
+        let detail = match why.step {
+            0 => why.value as u16,
+            step => step,
+        };
+        self.refusal = u32::from(axis) << 24 | (why.reason as u32) << 16 | u32::from(detail);
+        Err(if why.reason.is_of_the_value() {
+            AbortCode::VALUE_RANGE
+        } else {
+            AbortCode::DEVICE_STATE
         })
-    }
-}
-
-/// What was refused: 2002h, and what the client is told.
-#[derive(Clone, Copy, Debug)]
-struct Refused {
-    why: u32,
-    code: AbortCode,
-}
-
-impl Refused {
-    const fn new(axis: u8, reason: Reason, detail: u32) -> Refused {
-        Refused::because(axis, reason as u8, detail)
-    }
-
-    /// A move or a program that cannot be made.
-    const fn of(error: PlanError) -> Refused {
-        let detail = match error.step {
-            0 => error.value as u32,
-            step => step as u32,
-        };
-        Refused::because(error.axis, FAULTS + error.fault as u8, detail)
-    }
-
-    const fn because(axis: u8, reason: u8, detail: u32) -> Refused {
-        let axis = if axis == NONE { NONE } else { axis + 1 };
-        Refused {
-            why: (axis as u32) << 24 | (reason as u32) << 16 | detail & u16::MAX as u32,
-            code: if reason >= FAULTS || Reason::of_the_value(reason) {
-                AbortCode::VALUE_RANGE
-            } else {
-                AbortCode::DEVICE_STATE
-            },
-        }
-    }
-}
-
-impl From<Refusal> for Refused {
-    fn from(refusal: Refusal) -> Refused {
-        let (axis, reason, detail) = match refusal {
-            Refusal::NotFresh { axis } => (axis, Reason::NotFresh, 0),
-            Refusal::NotAtRest { axis, velocity } => {
-                (axis, Reason::NotAtRest, velocity.unsigned_abs())
-            }
-            Refusal::WrongMode { axis, mode } => (axis, Reason::WrongMode, mode as u32),
-            Refusal::ModeNotSupported { axis, mode, .. } => (axis, Reason::NoSuchMode, mode as u32),
-            Refusal::Program(error) => return Refused::of(error),
-            Refusal::NetworkNotReady => (NONE, Reason::Network, 0),
-            Refusal::NotIn(state) | Refusal::NotInStandby(state) => {
-                (NONE, Reason::State, state as u32)
-            }
-            Refusal::Busy | Refusal::StopRequested => (NONE, Reason::Busy, 0),
-        };
-        Refused::new(axis, reason, detail)
     }
 }
 

@@ -24,8 +24,9 @@ const BEND_MIN: f32 = 1.0 / 64.0;
 const HALF: f32 = 0.5;
 const SIXTH: f32 = 1.0 / 6.0;
 
-/// Where an axis shall be and how fast.
+/// Where an axis shall be and how fast. There are many: without gaps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(C, packed(4))]
 pub struct Knot {
     /// So many cycles after the knot before; at least 1.
     pub cycles: u32,

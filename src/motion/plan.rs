@@ -12,6 +12,7 @@
 //! ramp of the same length, so that nothing else changes.
 
 use super::fixed::{self, ceil};
+use super::greater;
 use super::path::{Knot, LEG_KNOTS, Point};
 use heapless::Vec;
 
@@ -110,10 +111,6 @@ struct Phases {
     up: u32,
     down: u32,
     jerk: u32,
-}
-
-fn greater(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
 }
 
 impl Leg {

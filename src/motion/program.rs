@@ -1,7 +1,7 @@
 //! One axis' part of a move, and why a move or a program cannot be carried out.
 
-use super::AxisConfig;
 use super::scale::Scale;
+use super::{AxisConfig, GroupState};
 use crate::words::in_words;
 
 /// One axis' part of a move.
@@ -22,13 +22,29 @@ pub struct AxisMove {
     pub set: u8,
 }
 
-/// What of a move or a program is wrong.
+/// Why something is refused: the number that stands in 2002h.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 #[non_exhaustive]
-pub enum Fault {
-    /// Bytes of the program.
-    Length,
+pub enum Reason {
+    /// The order does not count in this state of the group, 2001h.
+    State = 1,
+    /// The axis' TPDO of this cycle is missing.
+    NotFresh = 2,
+    /// Speed in rpm: the axis turns.
+    NotAtRest = 3,
+    /// The network is not ready.
+    Network = 4,
+    /// The axis is in another mode of operation than the allowed one.
+    WrongMode = 5,
+    /// The drive does not have the mode; allowed are those of 6502h.
+    NoSuchMode = 6,
+    /// The last command is not carried out yet.
+    Busy = 7,
+    /// There is no such command, or no such axis.
+    Unknown = 8,
+    /// Bytes of the program. From here on a move or a program cannot be made.
+    Length = 16,
     /// Version of the format.
     Version,
     /// Number of axes that it is made for.
@@ -65,60 +81,93 @@ pub enum Fault {
     Time,
 }
 
-#[cfg(feature = "defmt")]
-impl Fault {
+impl Reason {
+    #[cfg(feature = "defmt")]
     const fn place(&self) -> u8 {
-        *self as u8
+        const GAP: u8 = Reason::Length as u8 - Reason::Unknown as u8 - 1;
+        let number = *self as u8;
+        number
+            - if number < Reason::Length as u8 {
+                1
+            } else {
+                GAP + 1
+            }
+    }
+
+    /// Whether another value would have been taken.
+    pub(super) const fn is_of_the_value(self) -> bool {
+        self as u8 >= Reason::Length as u8 || matches!(self, Reason::NoSuchMode | Reason::Unknown)
     }
 }
 
-in_words!(Fault by Fault::place {
-    Fault::Length => ("length in bytes"),
-    Fault::Version => ("version of the format"),
-    Fault::Axes => ("number of axes"),
-    Fault::Cycle => ("SYNC period in us"),
-    Fault::Checksum => ("checksum"),
-    Fault::Step => ("kind of the step"),
-    Fault::Members => ("set of axes"),
-    Fault::Mode => ("mode of operation"),
-    Fault::Loop => ("depth of loops"),
-    Fault::Points => ("number of points or cycles"),
-    Fault::Begin => ("begin of the path in increments from home"),
-    Fault::End => ("end of the path"),
-    Fault::Velocity => ("velocity in rpm"),
-    Fault::Acceleration => ("acceleration in rpm/s"),
-    Fault::Deceleration => ("deceleration in rpm/s"),
-    Fault::Target => ("target in increments from home"),
-    Fault::Torque => ("torque in per mille"),
-    Fault::Time => ("time in cycles"),
+in_words!(Reason by Reason::place {
+    Reason::State => ("state of the group"),
+    Reason::NotFresh => ("TPDO in this cycle"),
+    Reason::NotAtRest => ("speed in rpm"),
+    Reason::Network => ("readiness of the network"),
+    Reason::WrongMode => ("mode of operation (6061h)"),
+    Reason::NoSuchMode => ("mode of operation (6502h)"),
+    Reason::Busy => ("command that is not carried out yet"),
+    Reason::Unknown => ("command or axes"),
+    Reason::Length => ("length in bytes"),
+    Reason::Version => ("version of the format"),
+    Reason::Axes => ("number of axes"),
+    Reason::Cycle => ("SYNC period in us"),
+    Reason::Checksum => ("checksum"),
+    Reason::Step => ("kind of the step"),
+    Reason::Members => ("set of axes"),
+    Reason::Mode => ("mode of operation"),
+    Reason::Loop => ("depth of loops"),
+    Reason::Points => ("number of points or cycles"),
+    Reason::Begin => ("begin of the path in increments from home"),
+    Reason::End => ("end of the path"),
+    Reason::Velocity => ("velocity in rpm"),
+    Reason::Acceleration => ("acceleration in rpm/s"),
+    Reason::Deceleration => ("deceleration in rpm/s"),
+    Reason::Target => ("target in increments from home"),
+    Reason::Torque => ("torque in per mille"),
+    Reason::Time => ("time in cycles"),
 });
 
-/// Why a move or a program cannot be carried out.
+/// Why an order, a move or a program cannot be carried out. Nothing has been sent
+/// because of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PlanError {
+pub struct Refusal {
     /// What is wrong.
-    pub fault: Fault,
+    pub reason: Reason,
     /// Axis, counted from 0; [`NO_AXIS`](Self::NO_AXIS) where it is no matter of
     /// one.
     pub axis: u8,
-    /// Step of the program, counted from 1; 0: a single move, or the program as a
-    /// whole.
+    /// Step of the program, counted from 1; 0: none, or the program as a whole.
     pub step: u16,
-    /// What is asked for.
+    /// What is asked for, or what there is.
     pub value: i32,
     /// Largest magnitude allowed, or the only value.
     pub allowed: i32,
 }
 
-impl PlanError {
+impl Refusal {
     /// No single axis.
     pub const NO_AXIS: u8 = u8::MAX;
 
+    /// The last command is not carried out yet.
+    pub(super) const BUSY: Refusal = Refusal::whole(Reason::Busy, 1, 0);
+
+    /// The group is in a state in which that does not count.
+    pub const fn not_in(state: GroupState) -> Refusal {
+        Refusal::whole(Reason::State, state as u32, 0)
+    }
+
     /// Of no axis and no step.
-    pub(super) const fn whole(fault: Fault, value: u32, allowed: u32) -> PlanError {
-        PlanError {
-            fault,
-            axis: PlanError::NO_AXIS,
+    pub const fn whole(reason: Reason, value: u32, allowed: u32) -> Refusal {
+        Refusal::of(Refusal::NO_AXIS, reason, value, allowed)
+    }
+
+    /// Of an axis.
+    pub const fn of(axis: u8, reason: Reason, value: u32, allowed: u32) -> Refusal {
+        Refusal {
+            reason,
+            axis,
             step: 0,
             value: value as i32,
             allowed: allowed as i32,
@@ -126,27 +175,27 @@ impl PlanError {
     }
 }
 
-in_words!(PlanError {
-    PlanError { axis: PlanError::NO_AXIS, step, fault, value, allowed } => (
-        "step {}: {} is {}, allowed is {}", step, fault, value, allowed
+in_words!(Refusal {
+    Refusal { reason: Reason::State, value, .. } => (
+        "not while the group is {}", GroupState::of(value as u8)
     ),
-    PlanError { axis, step, fault, value, allowed } => (
-        "step {}, axis {}: {} is {}, allowed is {}", step, axis + 1, fault, value, allowed
+    Refusal { axis: Refusal::NO_AXIS, reason, value, allowed, .. } => (
+        "{} is {}, allowed is {}", reason, value, allowed
+    ),
+    Refusal { axis, reason, value, allowed, .. } => (
+        "axis {}: {} is {}, allowed is {}", axis + 1, reason, value, allowed
     ),
 });
 
-impl core::error::Error for PlanError {}
+impl core::error::Error for Refusal {}
 
 /// `value`, a magnitude above 0, against the largest that is allowed.
 #[inline(never)]
-pub(super) fn within(axis: u8, fault: Fault, value: u32, allowed: u32) -> Result<(), PlanError> {
+pub(super) fn within(axis: u8, reason: Reason, value: u32, allowed: u32) -> Result<(), Refusal> {
     if value.wrapping_sub(1) < allowed {
         return Ok(());
     }
-    Err(PlanError {
-        axis,
-        ..PlanError::whole(fault, value, allowed)
-    })
+    Err(Refusal::of(axis, reason, value, allowed))
 }
 
 impl AxisMove {
@@ -162,11 +211,11 @@ impl AxisMove {
     /// Checks all but the target against the limits of its axis.
     ///
     /// # Errors
-    /// [`PlanError`] for the first value that breaks a limit.
-    pub fn keeps(&self, axis: u8, limits: &AxisConfig) -> Result<(), PlanError> {
+    /// [`Refusal`] for the first value that breaks a limit.
+    pub fn keeps(&self, axis: u8, limits: &AxisConfig) -> Result<(), Refusal> {
         let most = limits.acceleration_max;
-        within(axis, Fault::Velocity, self.velocity, limits.velocity_max)?;
-        within(axis, Fault::Acceleration, self.acceleration, most)?;
-        within(axis, Fault::Deceleration, self.deceleration, most)
+        within(axis, Reason::Velocity, self.velocity, limits.velocity_max)?;
+        within(axis, Reason::Acceleration, self.acceleration, most)?;
+        within(axis, Reason::Deceleration, self.deceleration, most)
     }
 }

@@ -32,12 +32,11 @@ impl Scale {
     }
 
     /// The factors for what is counted by itself, in units and seconds.
-    pub const fn per_second(cycle: Duration) -> Scale {
-        let cycle_s = cycle.as_micros() as f32 / SECOND_US;
+    pub fn of_units(self) -> Scale {
         Scale {
-            per_rpm: cycle_s,
-            rpm: 1.0 / cycle_s,
-            cycles_per_second: 1.0 / cycle_s,
+            per_rpm: 1.0 / self.cycles_per_second,
+            rpm: self.cycles_per_second,
+            cycles_per_second: self.cycles_per_second,
         }
     }
 

@@ -38,8 +38,6 @@ pub struct Lost {
     pub node: NodeId,
     /// Its last state.
     pub last: State,
-    /// When its last heartbeat arrived.
-    pub heard: Instant,
 }
 
 /// Watches the heartbeat of one node.
@@ -147,7 +145,6 @@ impl Consumer {
         Some(Lost {
             node: self.node,
             last,
-            heard: self.heard,
         })
     }
 }

@@ -36,7 +36,6 @@ pub struct Guardian {
     unanswered: u16,
     next: Option<Instant>,
     state: Option<State>,
-    heard: Instant,
     lost: bool,
 }
 
@@ -52,7 +51,6 @@ impl Guardian {
             unanswered: 0,
             next: None,
             state: None,
-            heard: Instant::ZERO,
             lost: false,
         }
     }
@@ -104,7 +102,6 @@ impl Guardian {
             return Some(Guard::Lost(Lost {
                 node: self.node,
                 last,
-                heard: self.heard,
             }));
         }
         let after = due + self.time;
@@ -133,7 +130,6 @@ impl Guardian {
         self.toggle = !self.toggle;
         self.unanswered = 0;
         self.state = Some(to);
-        self.heard = now;
         self.lost = false;
         Some(match before {
             None => Heard::First(to),

@@ -5,7 +5,7 @@ use canmaster::motion::mode::Mode;
 use canmaster::motion::{AxisMove, GroupState};
 
 use crate::compiled::pairs;
-use crate::rig::{AXES, CYCLE_MS, READY, Rig};
+use crate::rig::{ALL, AXES, CYCLE_MS, READY, Rig};
 
 /// Worst figures of one round trip.
 #[derive(Clone, Copy, Debug, Default)]
@@ -111,16 +111,14 @@ fn in_cyclic_position_all_start_and_arrive_in_one_sync() {
         rig.released();
         let homes: [i32; AXES] = core::array::from_fn(|n| rig.group.view(n).unwrap().home);
         let ways = [40_000, -7000, 123_456, 20, -99_999, 1];
-        let parts = core::array::from_fn(|n| {
-            Some(AxisMove {
-                target: ways[n],
-                velocity: 900,
-                acceleration: 1500,
-                deceleration: 1100,
-                set: 0,
-            })
+        let parts = core::array::from_fn(|n| AxisMove {
+            target: ways[n],
+            velocity: 900,
+            acceleration: 1500,
+            deceleration: 1100,
+            set: 0,
         });
-        rig.director.go(&rig.group, &parts, false, jerk).unwrap();
+        rig.director.go(&rig.group, ALL, &parts, jerk).unwrap();
         let mut last = rig.commands.map(|command| command.target);
         let (mut first_change, mut last_change) = ([0i32; AXES], [0i32; AXES]);
         for cycle in 1..2000i32 {
@@ -202,14 +200,12 @@ fn a_target_is_replaced_in_motion() {
                 rig.step(READY);
             }
             let target = |n: usize| [-5000, 90_000, 70_000, 10, 4000, 4100][n];
-            let parts = core::array::from_fn(|n| {
-                Some(AxisMove {
-                    target: target(n),
-                    set: 0,
-                    ..crate::rig::far(n)
-                })
+            let parts = core::array::from_fn(|n| AxisMove {
+                target: target(n),
+                set: 0,
+                ..crate::rig::far(n)
             });
-            rig.director.go(&rig.group, &parts, false, jerk).unwrap();
+            rig.director.go(&rig.group, ALL, &parts, jerk).unwrap();
             let mut speed = rig.drives.each_ref().map(|drive| drive.velocity);
             rig.step(READY);
             let mut cycles = 0;

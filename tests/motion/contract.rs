@@ -4,7 +4,7 @@ use canmaster::cia402::{Command, ControlWord, State};
 use canmaster::motion::experiment::{Motor, group};
 use canmaster::motion::mode::Mode;
 use canmaster::motion::{Director, Group, GroupConfig, Inputs, Order};
-use canmaster::motion::{Fault, FaultCause, GroupEvent, GroupState, PlanError, Refusal};
+use canmaster::motion::{FaultCause, GroupEvent, GroupState, Reason, Refusal};
 use canmaster::time::Duration;
 
 use crate::rig::{ALL, AXES, READY, Rig, far};
@@ -19,23 +19,30 @@ const FAST: u32 = 100;
 #[test]
 fn a_release_is_refused_with_its_reason() {
     let mut rig = Rig::new(8);
-    assert_eq!(rig.group.order(Order::Release), Err(Refusal::NotIn(Idle)));
+    assert_eq!(rig.group.order(Order::Release), Err(Refusal::not_in(Idle)));
     rig.until(Standby, 100);
     rig.silent[AXIS] = true;
     rig.step(READY);
     let why = rig.group.order(Order::Release);
-    assert_eq!(why, Err(Refusal::NotFresh { axis: AXIS as u8 }));
+    assert_eq!(why, Err(Refusal::of(AXIS as u8, Reason::NotFresh, 0, 1)));
     rig.silent[AXIS] = false;
     rig.drives[AXIS].velocity = 20.0;
     rig.step(READY);
     let why = rig.group.order(Order::Release);
     assert!(
-        matches!(why, Err(Refusal::NotAtRest { axis: 3, .. })),
+        matches!(
+            why,
+            Err(Refusal {
+                reason: Reason::NotAtRest,
+                axis: 3,
+                ..
+            })
+        ),
         "{why:?}"
     );
-    let parts = core::array::from_fn(|n| Some(far(n)));
-    let why = rig.director.go(&rig.group, &parts, false, 0);
-    assert_eq!(why, Err(Refusal::NotIn(Standby)));
+    let parts = core::array::from_fn(far);
+    let why = rig.director.go(&rig.group, ALL, &parts, 0);
+    assert_eq!(why, Err(Refusal::not_in(Standby)));
     for _ in 0..50 {
         rig.step(READY);
         assert!(rig.commands.iter().all(|command| command.target == 0));
@@ -48,11 +55,11 @@ fn a_release_is_refused_with_its_reason() {
 fn a_target_outside_the_limits_is_refused() {
     let mut rig = Rig::standby(1);
     rig.released();
-    for (change, fault, allowed) in [
-        (0, Fault::Velocity, 3000),
-        (1, Fault::Acceleration, 20_000),
-        (2, Fault::Deceleration, 20_000),
-        (3, Fault::Target, -1_073_741_823),
+    for (change, reason, allowed) in [
+        (0, Reason::Velocity, 3000),
+        (1, Reason::Acceleration, 20_000),
+        (2, Reason::Deceleration, 20_000),
+        (3, Reason::Target, -1_073_741_823),
     ] {
         let parts = core::array::from_fn(|n| {
             let mut part = far(n);
@@ -64,22 +71,22 @@ fn a_target_outside_the_limits_is_refused() {
                     _ => part.target = -1_073_741_824,
                 }
             }
-            Some(part)
+            part
         });
-        let refused = rig.director.go(&rig.group, &parts, false, 0);
+        let refused = rig.director.go(&rig.group, ALL, &parts, 0);
         let value = if allowed < 0 {
             allowed - 1
         } else {
             allowed + 1
         };
-        let expected = PlanError {
-            fault,
+        let expected = Refusal {
+            reason,
             axis: AXIS as u8,
             step: 0,
             value,
             allowed,
         };
-        assert_eq!(refused, Err(Refusal::Program(expected)));
+        assert_eq!(refused, Err(expected));
     }
     for _ in 0..20 {
         rig.step(READY);
@@ -105,34 +112,30 @@ fn turning_around_outside_of_the_travel_is_refused() {
     rig.until(Standby, 100);
     rig.released();
     let part = |target| {
-        let mut parts = [None; AXES];
-        parts[0] = Some(canmaster::motion::AxisMove {
+        [canmaster::motion::AxisMove {
             target,
             velocity: 2000,
             acceleration: 4000,
             deceleration: 4000,
             set: 0,
-        });
-        parts
+        }; AXES]
     };
-    rig.director
-        .go(&rig.group, &part(2_000_000), false, 0)
-        .unwrap();
+    rig.director.go(&rig.group, 1, &part(2_000_000), 0).unwrap();
     let home = rig.group.view(0).unwrap().home;
     while rig.group.view(0).unwrap().reference - home < 1_984_000 {
         rig.step(READY);
         assert!(rig.cycle < 4000, "{}", rig.last());
     }
     let mut slower = part(1_985_000);
-    slower[0].as_mut().unwrap().deceleration = 100;
-    rig.director.go(&rig.group, &slower, false, 0).unwrap();
+    slower[0].deceleration = 100;
+    rig.director.go(&rig.group, 1, &slower, 0).unwrap();
     rig.step(READY);
     assert!(
         matches!(
             rig.notices.last(),
-            Some(GroupEvent::MoveRefused(PlanError {
+            Some(GroupEvent::MoveRefused(Refusal {
                 axis: 0,
-                fault: Fault::Target,
+                reason: Reason::Target,
                 ..
             }))
         ),
@@ -250,7 +253,7 @@ fn recovery_leads_to_standby_and_not_to_motion() {
             rig.step(READY);
             assert_eq!(
                 rig.group.order(Order::Release),
-                Err(Refusal::NotIn(Faulted))
+                Err(Refusal::not_in(Faulted))
             );
         }
         if reset {
@@ -298,7 +301,10 @@ fn a_reset_without_network_is_refused() {
         rig.step(down);
     }
     assert_eq!(rig.group.state(), Faulted);
-    assert_eq!(rig.group.order(Order::Reset), Err(Refusal::NetworkNotReady));
+    assert_eq!(
+        rig.group.order(Order::Reset),
+        Err(Refusal::whole(Reason::Network, 0, 1))
+    );
 }
 
 /// A stop in motion: the axes rest together, and the next release begins there.
@@ -434,8 +440,8 @@ fn a_path_that_runs_dry_is_a_fault() {
 #[test]
 fn orders_are_refused_where_the_table_says() {
     let mut rig = Rig::standby(1);
-    assert_eq!(rig.group.order(Order::Reset), Err(Refusal::NotIn(Standby)));
-    assert_eq!(rig.group.order(Order::Halt), Err(Refusal::NotIn(Standby)));
+    assert_eq!(rig.group.order(Order::Reset), Err(Refusal::not_in(Standby)));
+    assert_eq!(rig.group.order(Order::Halt), Err(Refusal::not_in(Standby)));
     let home = Order::Home {
         axes: ALL,
         limit: 100,
@@ -443,14 +449,19 @@ fn orders_are_refused_where_the_table_says() {
     let mode = Mode::ProfileVelocity;
     assert_eq!(
         rig.group.order(home),
-        Err(Refusal::WrongMode { axis: 0, mode })
+        Err(Refusal::of(
+            0,
+            Reason::WrongMode,
+            mode as u32,
+            Mode::Homing as u32
+        ))
     );
     rig.released();
     let cyclic = Order::SetMode {
         axes: ALL,
         mode: Mode::CyclicPosition,
     };
-    assert_eq!(rig.group.order(cyclic), Err(Refusal::NotIn(Moving)));
+    assert_eq!(rig.group.order(cyclic), Err(Refusal::not_in(Moving)));
 }
 
 /// A drive that was switched off in motion may be enabled again before its axis

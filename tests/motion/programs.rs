@@ -3,7 +3,7 @@
 use canmaster::motion::experiment::GROUP;
 use canmaster::motion::format;
 use canmaster::motion::mode::Mode;
-use canmaster::motion::{Fault, GroupEvent, GroupState, PlanError};
+use canmaster::motion::{GroupEvent, GroupState, Reason, Refusal};
 use canmaster::sdo::Crc16;
 use canmaster_network::program::pairs;
 use proptest::prelude::*;
@@ -306,8 +306,8 @@ fn a_relative_move_out_of_the_travel_fails_at_its_step() {
         GroupEvent::ProgramFailed(error) => Some(*error),
         _ => None,
     });
-    let expected = PlanError {
-        fault: Fault::Target,
+    let expected = Refusal {
+        reason: Reason::Target,
         axis: 0,
         step: 2,
         value: 1_073_742_823,
@@ -332,25 +332,25 @@ fn a_path_begins_where_it_says() {
     let Some(GroupEvent::ProgramFailed(error)) = failed else {
         panic!("{failed:?}");
     };
-    let found = (error.fault, error.step, error.value, error.allowed);
-    assert_eq!(found, (Fault::Begin, 2, 50, 0));
+    let found = (error.reason, error.step, error.value, error.allowed);
+    assert_eq!(found, (Reason::Begin, 2, 50, 0));
     assert_eq!(rig.group.state(), GroupState::Standby);
 }
 
 /// What is wrong with `bytes`: fault, axis, step, value, allowed.
-fn wrong(bytes: &[u8]) -> (Fault, u8, u16, i32, i32) {
+fn wrong(bytes: &[u8]) -> (Reason, u8, u16, i32, i32) {
     let error = format::check(bytes, &GROUP).unwrap_err();
-    let PlanError {
-        fault,
+    let Refusal {
+        reason,
         axis,
         step,
         value,
         allowed,
     } = error;
-    (fault, axis, step, value, allowed)
+    (reason, axis, step, value, allowed)
 }
 
-const NONE: u8 = PlanError::NO_AXIS;
+const NONE: u8 = Refusal::NO_AXIS;
 
 #[test]
 fn a_frame_that_is_wrong_is_named() {
@@ -360,21 +360,21 @@ fn a_frame_that_is_wrong_is_named() {
         bytes[at] = value;
         wrong(&bytes)
     };
-    assert_eq!(with(0, 1), (Fault::Version, NONE, 0, 1, 2));
-    assert_eq!(with(1, 5), (Fault::Axes, NONE, 0, 5, 6));
-    assert_eq!(with(4, 0), (Fault::Cycle, NONE, 0, 9984, 10_000));
+    assert_eq!(with(0, 1), (Reason::Version, NONE, 0, 1, 2));
+    assert_eq!(with(1, 5), (Reason::Axes, NONE, 0, 5, 6));
+    assert_eq!(with(4, 0), (Reason::Cycle, NONE, 0, 9984, 10_000));
     let longer = [&bytes[..], &[0]].concat();
-    assert_eq!(wrong(&longer), (Fault::Length, NONE, 0, 19, 18));
+    assert_eq!(wrong(&longer), (Reason::Length, NONE, 0, 19, 18));
     for length in 0..bytes.len() {
         assert!(format::check(&bytes[..length], &GROUP).is_err());
     }
     for (at, byte) in bytes.iter().enumerate().skip(8) {
-        assert_eq!(with(at, byte ^ 0x10).0, Fault::Checksum, "{at}");
+        assert_eq!(with(at, byte ^ 0x10).0, Reason::Checksum, "{at}");
     }
     let error = format::check(&bytes[..8], &GROUP).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "step 0: length in bytes is 8, allowed is 18"
+        "length in bytes is 8, allowed is 18"
     );
 }
 
@@ -383,25 +383,25 @@ fn a_step_that_is_wrong_is_named() {
     let good = go(0, &[(0, 1, 1, 1)]);
     let of = |steps: &[Vec<u8>]| wrong(&program(steps));
     let unknown = head(99, 0, 0, 0);
-    assert_eq!(of(&[good, unknown]), (Fault::Step, NONE, 2, 99, 7));
-    assert_eq!(of(&[vec![0]]).0, Fault::Length);
-    assert_eq!(of(&[vec![1, 0, 1, 0]]).0, Fault::Length);
+    assert_eq!(of(&[good, unknown]), (Reason::Step, NONE, 2, 99, 7));
+    assert_eq!(of(&[vec![0]]).0, Reason::Length);
+    assert_eq!(of(&[vec![1, 0, 1, 0]]).0, Reason::Length);
     let seventh = go(0, &[(6, 1, 1, 1)]);
-    assert_eq!(of(&[seventh]), (Fault::Members, NONE, 1, 64, 63));
-    assert_eq!(of(&[go(0, &[])]), (Fault::Members, NONE, 1, 0, 63));
-    assert_eq!(of(&[end()]), (Fault::Loop, NONE, 1, 0, 4));
-    assert_eq!(of(&[times(1)]), (Fault::Loop, NONE, 0, 1, 0));
-    assert_eq!(of(&vec![times(1); 5]), (Fault::Loop, NONE, 5, 5, 4));
+    assert_eq!(of(&[seventh]), (Reason::Members, NONE, 1, 64, 63));
+    assert_eq!(of(&[go(0, &[])]), (Reason::Members, NONE, 1, 0, 63));
+    assert_eq!(of(&[end()]), (Reason::Loop, NONE, 1, 0, 4));
+    assert_eq!(of(&[times(1)]), (Reason::Loop, NONE, 0, 1, 0));
+    assert_eq!(of(&vec![times(1); 5]), (Reason::Loop, NONE, 5, 5, 4));
     let mode = head(format::MODE, 7, 1, 0);
-    assert_eq!(of(&[mode]), (Fault::Mode, 0, 1, 7, 0x3A5));
+    assert_eq!(of(&[mode]), (Reason::Mode, 0, 1, 7, 0x3A5));
     let steep = go(0, &[(3, 1, 1, 100_000)]);
-    assert_eq!(of(&[steep]), (Fault::Acceleration, 3, 1, 100_000, 20_000));
+    assert_eq!(of(&[steep]), (Reason::Acceleration, 3, 1, 100_000, 20_000));
     let fast = go(0, &[(4, 1, 3001, 1)]);
-    assert_eq!(of(&[fast]), (Fault::Velocity, 4, 1, 3001, 3000));
+    assert_eq!(of(&[fast]), (Reason::Velocity, 4, 1, 3001, 3000));
     let none = go(0, &[(4, 1, 0, 1)]);
-    assert_eq!(of(&[none]), (Fault::Velocity, 4, 1, 0, 3000));
+    assert_eq!(of(&[none]), (Reason::Velocity, 4, 1, 0, 3000));
     let far = go(0, &[(2, i32::MIN, 1, 1)]);
-    let expected = (Fault::Target, 2, 1, i32::MIN, -1_073_741_823);
+    let expected = (Reason::Target, 2, 1, i32::MIN, -1_073_741_823);
     assert_eq!(of(&[far]), expected);
 }
 
@@ -410,23 +410,23 @@ fn a_path_that_is_wrong_is_named() {
     const ONCE: u32 = 1 << 16;
     let of = |step: Vec<u8>| wrong(&program(&[step]));
     let nothing = shape(1, ONCE, 1, &[]);
-    assert_eq!(of(nothing), (Fault::Points, NONE, 1, 1 << 16, 0));
-    assert_eq!(of(shape(1, 1, 1, &[(1, 0, 0)])).0, Fault::Points);
+    assert_eq!(of(nothing), (Reason::Points, NONE, 1, 1 << 16, 0));
+    assert_eq!(of(shape(1, 1, 1, &[(1, 0, 0)])).0, Reason::Points);
     let no_time = shape(1, ONCE | 1, 1, &[(0, 0, 0)]);
-    assert_eq!(of(no_time), (Fault::Points, 0, 1, 0, -1));
+    assert_eq!(of(no_time), (Reason::Points, 0, 1, 0, -1));
     // 1000 increments in one cycle: three times as fast in the middle.
     let fast = shape(1, ONCE | 1, 1 << 30, &[(1, 4000, 0)]);
-    assert_eq!(of(fast), (Fault::Velocity, 0, 1, 9000, 3000));
+    assert_eq!(of(fast), (Reason::Velocity, 0, 1, 9000, 3000));
     let steep = shape(1, ONCE | 1, 1 << 30, &[(3, 1200, 0)]);
-    assert_eq!(of(steep).0, Fault::Acceleration);
+    assert_eq!(of(steep).0, Reason::Acceleration);
     let goes_on = shape(1, ONCE | 1, 1 << 30, &[(10, 40, 8)]);
-    assert_eq!(of(goes_on), (Fault::End, 0, 1, 0, 0));
+    assert_eq!(of(goes_on), (Reason::End, 0, 1, 0, 0));
     let climbs = shape(1, 2 << 16 | 1, 1 << 30, &[(10, 40, 0)]);
-    assert_eq!(of(climbs), (Fault::End, 0, 1, 10, 0));
+    assert_eq!(of(climbs), (Reason::End, 0, 1, 10, 0));
     // Slow, but far.
     let far = vec![(u16::MAX, i32::MAX / 2, 0), (u16::MAX, i32::MAX, 0)];
     let far = shape(0, ONCE | 2, i32::MAX, &far);
-    assert_eq!(of(far).0, Fault::Velocity);
+    assert_eq!(of(far).0, Reason::Velocity);
 }
 
 proptest! {

@@ -105,8 +105,8 @@ impl Rig {
 
     /// A move of all axes.
     pub(crate) fn go(&mut self, part: impl Fn(usize) -> AxisMove) {
-        let parts = core::array::from_fn(|n| Some(part(n)));
-        assert_eq!(self.director.go(&self.group, &parts, false, 0), Ok(()));
+        let parts = core::array::from_fn(part);
+        assert_eq!(self.director.go(&self.group, ALL, &parts, 0), Ok(()));
     }
 
     /// Releases the program.
@@ -144,7 +144,9 @@ impl Rig {
             self.events.push(event);
         }
         self.director.round(&mut self.group, &self.program);
-        self.notices.extend(self.director.take_event());
+        while let Some(event) = self.group.take_event() {
+            self.notices.push(event);
+        }
         if self.confirms
             && let Some(wanted) = self.group.mode_wanted()
         {

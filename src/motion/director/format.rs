@@ -3,8 +3,8 @@
 use crate::motion::fixed;
 use crate::motion::mode::Mode;
 use crate::motion::path::Knot;
-use crate::motion::program::{AxisMove, Fault, PlanError, within};
-use crate::motion::{AxisConfig, GroupConfig};
+use crate::motion::program::{AxisMove, Reason, Refusal, within};
+use crate::motion::{AxisConfig, GroupConfig, next};
 use crate::sdo::Crc16;
 
 /// The version of the format.
@@ -164,7 +164,7 @@ impl<'a> Step<'a> {
         member: usize,
         limits: &AxisConfig,
         begin: Option<i32>,
-    ) -> Result<f32, PlanError> {
+    ) -> Result<f32, Refusal> {
         const THIRD: f32 = 1.0 / 3.0;
         let mut before = Knot::default();
         let (mut fastest, mut steepest) = (0.0, 0.0);
@@ -192,27 +192,25 @@ impl<'a> Step<'a> {
                 }
             }
             before = knot;
-            within(axis, Fault::Points, knot.cycles, u32::MAX)?;
+            within(axis, Reason::Points, knot.cycles, u32::MAX)?;
         }
         let (rpm, slope) = (limits.scale.rpm(fastest), limits.scale.rpm_per_s(steepest));
         let most = limits.acceleration_max;
         within(
             axis,
-            Fault::Velocity,
+            Reason::Velocity,
             (rpm as u32).max(1),
             limits.velocity_max,
         )?;
-        within(axis, Fault::Acceleration, (slope as u32).max(1), most)?;
+        within(axis, Reason::Acceleration, (slope as u32).max(1), most)?;
         let way = if self.periods() > 1 {
             before.position
         } else {
             0
         };
         if before.velocity | way != 0 {
-            return Err(PlanError {
-                axis,
-                ..PlanError::whole(Fault::End, fixed::round(way) as u32, 0)
-            });
+            let way = fixed::round(way) as u32;
+            return Err(Refusal::of(axis, Reason::End, way, 0));
         }
         Ok(steepest)
     }
@@ -224,18 +222,12 @@ pub(super) fn steps(bytes: &[u8]) -> &[u8] {
     bytes.get(HEADER..end).unwrap_or_default()
 }
 
-/// The axes of a set with their place among its members.
-pub(super) fn members(axes: u32) -> impl Iterator<Item = (usize, usize)> {
-    let axes = (0..u16::BITS as usize).filter(move |axis| axes >> axis & 1 != 0);
-    axes.enumerate().map(|(member, axis)| (axis, member))
-}
-
 /// Reads all of a program against the limits of the axes, as far as they do not
 /// depend on where the axes are.
 ///
 /// # Errors
 /// The first that is wrong, and in which step.
-pub fn check<const N: usize>(bytes: &[u8], config: &GroupConfig<N>) -> Result<(), PlanError> {
+pub fn check<const N: usize>(bytes: &[u8], config: &GroupConfig<N>) -> Result<(), Refusal> {
     let length = bytes.len() as u32;
     let head = number(bytes, 0);
     let summed = bytes.len().saturating_sub(CRC);
@@ -244,15 +236,15 @@ pub fn check<const N: usize>(bytes: &[u8], config: &GroupConfig<N>) -> Result<()
     let frame = (HEADER + CRC) as u32 + (head >> u16::BITS);
     let axes = u32::from((head >> u8::BITS) as u8);
     let cycle = number(bytes, NUMBER);
-    for (fault, value, allowed) in [
-        (Fault::Version, u32::from(head as u8), VERSION.into()),
-        (Fault::Axes, axes, N as u32),
-        (Fault::Length, length, frame),
-        (Fault::Cycle, cycle, config.cycle.as_micros()),
-        (Fault::Checksum, crc, sum.get().into()),
+    for (reason, value, allowed) in [
+        (Reason::Version, u32::from(head as u8), VERSION.into()),
+        (Reason::Axes, axes, N as u32),
+        (Reason::Length, length, frame),
+        (Reason::Cycle, cycle, config.cycle.as_micros()),
+        (Reason::Checksum, crc, sum.get().into()),
     ] {
         if value != allowed {
-            return Err(PlanError::whole(fault, value, allowed));
+            return Err(Refusal::whole(reason, value, allowed));
         }
     }
     let steps = steps(bytes);
@@ -263,18 +255,18 @@ pub fn check<const N: usize>(bytes: &[u8], config: &GroupConfig<N>) -> Result<()
         at += step.len();
         let checked = if at > steps.len() {
             let end = steps.len() as u32;
-            Err(PlanError::whole(Fault::Length, at as u32, end))
+            Err(Refusal::whole(Reason::Length, at as u32, end))
         } else {
             check_step(&step, &mut depth, config)
         };
-        checked.map_err(|error| PlanError {
+        checked.map_err(|error| Refusal {
             step: number,
             ..error
         })?;
     }
     match depth {
         0 => Ok(()),
-        depth => Err(PlanError::whole(Fault::Loop, depth, 0)),
+        depth => Err(Refusal::whole(Reason::Loop, depth, 0)),
     }
 }
 
@@ -283,7 +275,7 @@ fn check_step<const N: usize>(
     step: &Step<'_>,
     depth: &mut u32,
     config: &GroupConfig<N>,
-) -> Result<(), PlanError> {
+) -> Result<(), Refusal> {
     match step.kind {
         WAIT => return Ok(()),
         LOOP | END_LOOP => {
@@ -295,21 +287,22 @@ fn check_step<const N: usize>(
             *depth = then;
             return match now {
                 1..=4 => Ok(()),
-                _ => Err(PlanError::whole(Fault::Loop, now, LOOPS as u32)),
+                _ => Err(Refusal::whole(Reason::Loop, now, LOOPS as u32)),
             };
         }
         MOVE | PATH | HOME | MODE => {}
-        kind => return Err(PlanError::whole(Fault::Step, kind.into(), MODE.into())),
+        kind => return Err(Refusal::whole(Reason::Step, kind.into(), MODE.into())),
     }
     if step.axes == 0 || step.axes >> N != 0 {
-        return Err(PlanError::whole(Fault::Members, step.axes, (1 << N) - 1));
+        return Err(Refusal::whole(Reason::Members, step.axes, (1 << N) - 1));
     }
     if step.kind == PATH && (step.points() == 0 || step.periods() == 0) {
-        return Err(PlanError::whole(Fault::Points, step.value, 0));
+        return Err(Refusal::whole(Reason::Points, step.value, 0));
     }
-    for (axis, member) in members(step.axes) {
+    let (mut left, mut member) = (step.axes, 0);
+    while let Some(axis) = next(&mut left) {
         let Some(limits) = config.axes.get(axis) else {
-            continue;
+            break;
         };
         let absolute = !step.has(RELATIVE);
         let number = axis as u8;
@@ -332,12 +325,11 @@ fn check_step<const N: usize>(
             }
             _ if Mode::of(mode).is_some_and(|mode| mode.is_in(limits.modes)) => {}
             _ => {
-                return Err(PlanError {
-                    axis: number,
-                    ..PlanError::whole(Fault::Mode, mode as u32, limits.modes)
-                });
+                let allowed = limits.modes;
+                return Err(Refusal::of(number, Reason::Mode, mode as u32, allowed));
             }
         }
+        member += 1;
     }
     Ok(())
 }

@@ -5,22 +5,20 @@
 //! meanwhile: a plan says in which of them it begins.
 
 pub mod format;
+mod legs;
 
-use self::format::{FLYING, RELATIVE, Step, members};
-use super::group::{Group, Order, SetPoint};
+use self::format::{FLYING, Step};
+use super::group::{Group, Order};
 use super::mode::Mode;
-use super::plan::{self, Leg};
-use super::program::{AxisMove, Fault, PlanError, within};
-use super::scale::Scale;
-use super::{AxisConfig, GroupConfig, GroupEvent, GroupState, Refusal, fixed};
+use super::plan::Leg;
+use super::program::Refusal;
+use super::{AxisConfig, AxisMove, GroupConfig, GroupEvent, GroupState};
 use heapless::Vec;
 
 /// Cycles from the look at the group to the first step of the plan; doubled when
 /// that was too short, up to the longest.
 const LEAD: u32 = 2;
 const LATER_MAX: u32 = 62;
-/// Points of a path that are handed over in one look, since the group waits.
-const POINTS: usize = 2;
 
 /// What is being done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -82,7 +80,8 @@ pub struct Director<const N: usize> {
     later: u32,
     /// Cycles until the next look is needed; 0: something happens before.
     patience: u32,
-    event: Vec<GroupEvent, 1>,
+    /// Why a plan could not be made.
+    error: Option<Refusal>,
     loops: Vec<Loop, { format::LOOPS }>,
     legs: [Leg; N],
 }
@@ -104,9 +103,9 @@ impl<const N: usize> Director<N> {
         start: 0,
         later: 0,
         patience: 0,
+        error: None,
         loops: Vec::new(),
         legs: [const { Leg::ZERO }; N],
-        event: Vec::new(),
     };
 
     /// Nothing is planned.
@@ -132,72 +131,56 @@ impl<const N: usize> Director<N> {
         self.patience
     }
 
-    /// What it has to report: to be taken after every round.
-    pub fn take_event(&mut self) -> Option<GroupEvent> {
-        self.event.pop()
-    }
-
-    /// Releases the group and runs a program once; a halted one goes on with the
-    /// step that was interrupted, from its beginning.
+    /// Runs a program once, and releases the group for it if it is not released; a
+    /// halted one goes on with the step that was interrupted, from its beginning.
     ///
     /// # Errors
-    /// [`Refusal`] of the group.
+    /// [`Refusal`] of the group, or because something else is being done.
     pub fn run(&mut self, group: &mut Group<N>) -> Result<(), Refusal> {
-        group.order(Order::Release)?;
-        if !(self.running && group.state() == GroupState::Halt) {
-            self.restart();
+        let state = group.state();
+        if state == GroupState::Moving {
+            self.is_free(group)?;
+        } else {
+            group.order(Order::Release)?;
+        }
+        if !(self.running && state == GroupState::Halt) {
+            self.running = true;
+            (self.at, self.number) = (0, 0);
+            self.loops.clear();
         }
         self.phase = Phase::Released;
         Ok(())
-    }
-
-    /// Runs a program once, the group being released.
-    ///
-    /// # Errors
-    /// [`Refusal`] if it is not, or does something else.
-    pub fn start(&mut self, group: &Group<N>) -> Result<(), Refusal> {
-        self.is_free(group)?;
-        self.restart();
-        self.phase = Phase::Released;
-        Ok(())
-    }
-
-    fn restart(&mut self) {
-        self.running = true;
-        (self.at, self.number) = (0, 0);
-        self.loops.clear();
     }
 
     /// Whether it can be told to move.
     fn is_free(&self, group: &Group<N>) -> Result<(), Refusal> {
         if group.state() != GroupState::Moving {
-            return Err(Refusal::NotIn(group.state()));
+            return Err(Refusal::not_in(group.state()));
         }
         if self.running || matches!(self.phase, Phase::Plan | Phase::Planned) {
-            return Err(Refusal::Busy);
+            return Err(Refusal::BUSY);
         }
         Ok(())
     }
 
-    /// One move of the axes that have a part, from the path that they follow now:
-    /// targets from home or, `relative`, from where their paths end. What an axis
-    /// was told before is replaced, without a jump in velocity.
+    /// One move of `axes` (bit n for axis n), from the path that they follow now, to
+    /// targets from home. What an axis was told before is replaced, without a jump in
+    /// velocity.
     ///
     /// # Errors
     /// [`Refusal`] before anything is sent.
     pub fn go(
         &mut self,
         group: &Group<N>,
-        parts: &[Option<AxisMove>; N],
-        relative: bool,
+        axes: u32,
+        parts: &[AxisMove; N],
         jerk: u32,
     ) -> Result<(), Refusal> {
         self.is_free(group)?;
         self.clear();
         for (axis, part) in parts.iter().enumerate() {
-            if let Some(part) = part {
-                let set = self.set_leg(group, axis, part, relative, jerk);
-                set.map_err(Refusal::Program)?;
+            if axes >> axis & 1 != 0 {
+                self.set_leg(group, axis, part, false, jerk)?;
             }
         }
         (self.path, self.flying) = (false, false);
@@ -217,15 +200,14 @@ impl<const N: usize> Director<N> {
     /// `program` are its bytes, as [`format::check`] took them; while it runs it has
     /// to stay the same. Whether there is something to plan.
     pub fn look(&mut self, group: &mut Group<N>, program: &[u8]) -> bool {
-        let steps = format::steps(program);
         self.patience = 0;
+        let steps = format::steps(program);
         match (self.phase, group.state()) {
             (Phase::Idle, _) => return false,
-            (Phase::Ordered, GroupState::Homing | GroupState::ModeChange)
-            | (Phase::Released, GroupState::Standby) => {}
-            (Phase::Finishing | Phase::Ordered, GroupState::Standby) => self.standby(group, steps),
             (_, GroupState::Moving) => self.moving(group),
-            (Phase::Released, GroupState::Halt) => {}
+            (Phase::Ordered, GroupState::Homing | GroupState::ModeChange)
+            | (Phase::Released, GroupState::Standby | GroupState::Halt) => {}
+            (Phase::Finishing | Phase::Ordered, GroupState::Standby) => self.standby(group, steps),
             // The step that is interrupted begins again with the next release.
             (_, GroupState::Halt) if self.running => {
                 self.number = self.number.saturating_sub(1);
@@ -233,24 +215,24 @@ impl<const N: usize> Director<N> {
             }
             _ => self.end(),
         }
-        match self.phase {
-            Phase::Next => self.read(group, steps),
-            Phase::Path => self.feed(group, &Step::at(steps, self.at)),
-            _ => {}
+        if self.phase == Phase::Next {
+            self.read(group, steps);
+        } else if self.phase == Phase::Path {
+            self.feed(group, &Step::at(steps, self.at));
         }
         let mut plan = false;
-        if self.phase == Phase::Plan {
-            self.patience = 1;
-            match self.predict(group, &Step::at(steps, self.at)) {
-                Ok(ready) => plan = ready,
-                error => self.judge(error.map(drop)),
-            }
-        }
         match self.phase {
             Phase::Next | Phase::Path => self.patience = 1,
             Phase::Waiting => self.patience = self.until.wrapping_sub(group.count()).max(1),
-            Phase::Failed => self.give_up(group),
+            Phase::Plan => {
+                self.patience = 1;
+                let ready = self.predict(group, &Step::at(steps, self.at));
+                plan = self.judge(ready);
+            }
             _ => {}
+        }
+        if self.phase == Phase::Failed {
+            self.give_up(group);
         }
         plan
     }
@@ -313,35 +295,35 @@ impl<const N: usize> Director<N> {
             (format::MODE, Some(mode)) => Order::SetMode { axes, mode },
             _ => {
                 self.end();
-                self.report(GroupEvent::ProgramDone);
+                group.report(GroupEvent::ProgramDone);
                 return;
             }
         };
         (self.phase, self.until) = (Phase::Ordered, count);
         if let Err(why) = group.order(order) {
             self.end();
-            self.report(GroupEvent::ReleaseRefused(why));
+            group.report(GroupEvent::ReleaseRefused(why));
         }
     }
 
     /// Begins the next step of the program.
-    fn read(&mut self, group: &Group<N>, steps: &[u8]) {
+    fn read(&mut self, group: &mut Group<N>, steps: &[u8]) {
         self.at = self.next;
         let step = Step::at(steps, self.at);
         self.next = self.at.saturating_add(step.len());
         if self.at < steps.len() {
             self.number = self.number.saturating_add(1);
-            self.report(GroupEvent::StepStarted {
-                step: self.number.wrapping_sub(1) as u8,
-            });
+            let step = self.number.wrapping_sub(1) as u8;
+            group.report(GroupEvent::StepStarted { step });
         }
         self.flying = step.has(FLYING);
         self.path = step.kind == format::PATH;
         self.phase = match step.kind {
             format::MOVE => {
-                let set = self.set_legs(group, &step);
                 self.phase = Phase::Plan;
-                return self.judge(set);
+                let set = self.set_legs(group, &step);
+                self.judge(set);
+                return;
             }
             format::PATH => Phase::Plan,
             format::WAIT => {
@@ -372,247 +354,31 @@ impl<const N: usize> Director<N> {
         };
     }
 
-    fn set_legs(&mut self, group: &Group<N>, step: &Step<'_>) -> Result<(), PlanError> {
-        self.clear();
-        let relative = step.has(RELATIVE);
-        for (axis, member) in members(step.axes) {
-            self.set_leg(group, axis, &step.part(member), relative, step.value)?;
-        }
-        Ok(())
-    }
-
-    /// The last counts.
+    /// Takes note of what went wrong.
     #[inline(never)]
-    fn report(&mut self, event: GroupEvent) {
-        self.event.clear();
-        // There is room.
-        let _ = self.event.push(event);
-    }
-
-    /// What went wrong is reported.
-    #[inline(never)]
-    fn judge(&mut self, result: Result<(), PlanError>) {
-        if let Err(error) = result {
+    fn judge(&mut self, result: Result<bool, Refusal>) -> bool {
+        result.unwrap_or_else(|error| {
             self.phase = Phase::Failed;
-            self.report(if self.running {
-                GroupEvent::ProgramFailed(PlanError {
-                    step: self.number,
-                    ..error
-                })
-            } else {
-                GroupEvent::MoveRefused(error)
-            });
-        }
+            self.error = Some(error);
+            false
+        })
     }
 
     /// After that: a program ends; a move that cannot be made leaves everything as
     /// it is.
     fn give_up(&mut self, group: &mut Group<N>) {
-        if self.running {
-            // The group moves: a stop is never refused.
-            let _ = group.order(Order::Stop);
+        if let Some(mut error) = self.error {
+            error.step = self.step();
+            if self.running {
+                // The group moves: a stop is never refused.
+                let _ = group.order(Order::Stop);
+            }
+            group.report(match self.running {
+                true => GroupEvent::ProgramFailed(error),
+                false => GroupEvent::MoveRefused(error),
+            });
         }
         self.end();
-    }
-
-    fn clear(&mut self) {
-        for leg in &mut self.legs {
-            leg.set = None;
-        }
-    }
-
-    /// The leg of an axis, checked against its limits.
-    #[inline(never)]
-    fn set_leg(
-        &mut self,
-        group: &Group<N>,
-        axis: usize,
-        part: &AxisMove,
-        relative: bool,
-        jerk: u32,
-    ) -> Result<(), PlanError> {
-        let number = axis as u8;
-        let (Some(config), Some(view), Some(leg)) =
-            (self.config, group.view(axis), self.legs.get_mut(axis))
-        else {
-            return Ok(());
-        };
-        let Some(limits) = config.axes.get(axis) else {
-            return Ok(());
-        };
-        let torque = view.mode == Mode::CyclicTorque;
-        let (home, scale) = if torque {
-            (0, Scale::per_second(config.cycle))
-        } else {
-            (view.home, limits.scale)
-        };
-        let mut target = part.target;
-        if relative {
-            target = target.saturating_add(view.end.wrapping_sub(home));
-        }
-        part.keeps(number, limits)?;
-        if torque {
-            let value = target.unsigned_abs().max(1);
-            within(number, Fault::Torque, value, limits.torque_max.into())?;
-        } else {
-            limits.reaches(number, target)?;
-        }
-        leg.set = Some(part.set);
-        leg.target = target.wrapping_add(home);
-        [leg.velocity, leg.acceleration, leg.deceleration] = part.limits(scale);
-        leg.jerk = scale.per_cycle(scale.acceleration(jerk as f32));
-        Ok(())
-    }
-
-    /// Where the paths will stand when the plan begins, and what is left to the
-    /// drives; `false` if one has not taken its last set-point yet.
-    #[inline(never)]
-    fn predict(&mut self, group: &mut Group<N>, step: &Step<'_>) -> Result<bool, PlanError> {
-        let lead = LEAD + self.later;
-        self.start = group.count().wrapping_add(lead);
-        let all = self.legs.iter_mut().zip(limits(self.config));
-        for (axis, (leg, limits)) in all.enumerate() {
-            let Some(view) = group.view(axis) else {
-                continue;
-            };
-            leg.home = view.home;
-            let is_in = step.axes >> axis & 1 != 0;
-            if self.path && is_in && !view.mode.has_position() {
-                // Its drive moves it by itself, or it is no motion.
-                let mode = u32::from(view.mode as u8);
-                return Err(PlanError {
-                    axis: axis as u8,
-                    ..PlanError::whole(Fault::Mode, mode, Mode::WITH_POSITION)
-                });
-            }
-            if !self.path && leg.set.is_some() && view.mode == Mode::ProfilePosition {
-                let up = limits.scale.rpm_per_s(leg.acceleration);
-                let down = limits.scale.rpm_per_s(leg.deceleration);
-                group.set_ramps(axis, up, down);
-                let set_point = SetPoint {
-                    target: leg.target,
-                    immediately: true,
-                    relative: false,
-                };
-                if !group.ask(axis, &set_point) {
-                    return Ok(false);
-                }
-                leg.set = None;
-            }
-            leg.from = group.predict(axis, lead - 1).unwrap_or_default();
-        }
-        Ok(true)
-    }
-
-    /// Plans what there is to plan, and checks it against the travel from where the
-    /// axes are.
-    pub fn think(&mut self, program: &[u8]) {
-        let step = Step::at(format::steps(program), self.at);
-        self.phase = Phase::Planned;
-        let result = self.plan(&step);
-        self.judge(result);
-    }
-
-    fn plan(&mut self, step: &Step<'_>) -> Result<(), PlanError> {
-        if !self.path {
-            plan::plan(&mut self.legs).map_err(|axis| PlanError {
-                axis,
-                ..PlanError::whole(Fault::Time, u32::MAX, plan::CYCLES_MAX)
-            })?;
-        }
-        let mut member = 0;
-        let all = self.legs.iter_mut().zip(limits(self.config));
-        for (axis, (leg, limits)) in (0..).zip(all) {
-            let from = fixed::round(leg.from.position).wrapping_sub(leg.home);
-            if !self.path {
-                if leg.set.is_some() && leg.turn != 0.0 {
-                    limits.reaches(axis, from.saturating_add(leg.turn as i32))?;
-                }
-            } else if step.axes >> axis & 1 != 0 {
-                let told = step.begin(member);
-                if !step.has(RELATIVE) && from != told {
-                    return Err(PlanError {
-                        axis,
-                        ..PlanError::whole(Fault::Begin, from as u32, told as u32)
-                    });
-                }
-                let slope = step.check_path(axis, member, limits, Some(from))?;
-                (leg.up, leg.down) = (slope, slope);
-                member += 1;
-            }
-        }
-        Ok(())
-    }
-
-    /// Hands the plan over. Too late for its first step, it is made anew.
-    pub fn act(&mut self, group: &mut Group<N>, program: &[u8]) {
-        match self.phase {
-            Phase::Failed => return self.give_up(group),
-            Phase::Planned => {}
-            _ => return,
-        }
-        let step = Step::at(format::steps(program), self.at);
-        let mut axes = step.axes;
-        if !self.path {
-            axes = 0;
-            for (axis, leg) in self.legs.iter().enumerate() {
-                axes |= u32::from(leg.set.is_some()) << axis;
-            }
-        }
-        // A path begins at rest: the sooner, the better.
-        let start = if self.path {
-            group.count().wrapping_add(1)
-        } else {
-            self.start
-        };
-        if group.announce(start, axes).is_err() {
-            self.later = LATER_MAX.min(self.later * 2 + LEAD);
-            self.phase = Phase::Plan;
-            return;
-        }
-        let all = self.legs.iter().zip(limits(self.config));
-        for (axis, (leg, limits)) in all.enumerate() {
-            if axes >> axis & 1 == 0 {
-                continue;
-            }
-            let up = limits.scale.rpm_per_s(leg.up);
-            group.set_ramps(axis, up, limits.scale.rpm_per_s(leg.down));
-            if !self.path {
-                for knot in &leg.knots {
-                    group.push(axis, knot);
-                }
-            }
-        }
-        self.phase = Phase::Arriving;
-        if self.path {
-            (self.point, self.period) = (0, 0);
-            self.phase = Phase::Path;
-            self.feed(group, &step);
-        }
-    }
-
-    /// Hands over the next points of a path, if there is room.
-    fn feed(&mut self, group: &mut Group<N>, step: &Step<'_>) {
-        for _ in 0..POINTS {
-            if self.period == step.periods() {
-                self.phase = Phase::Arriving;
-                return;
-            }
-            for (axis, member) in members(step.axes) {
-                if group.room(axis) == 0 {
-                    return;
-                }
-                let mut knot = step.point(member, self.point);
-                let begin = self.legs.get(axis).map_or(0, |leg| leg.from.position);
-                knot.position = knot.position.wrapping_add(begin);
-                group.push(axis, &knot);
-            }
-            self.point += 1;
-            if self.point == step.points() {
-                self.point = 0;
-                self.period += 1;
-            }
-        }
     }
 }
 

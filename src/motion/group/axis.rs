@@ -74,7 +74,7 @@ pub(super) enum Lead {
 /// All of it is 0 before the group is configured. Small fields stand first, where
 /// they are reached by short instructions.
 #[repr(C)]
-pub(super) struct Axis {
+pub(in crate::motion) struct Axis {
     pub(super) seen: Seen,
     /// Consecutive cycles at standstill since the path was over, and of those in
     /// position.
@@ -82,8 +82,8 @@ pub(super) struct Axis {
     placed: u8,
     /// Consecutive cycles without TPDO.
     pub(super) missing: u8,
-    /// As confirmed in 6061h, if it is another one than configured.
-    pub(super) changed: Option<Mode>,
+    /// As confirmed in 6061h; none before the group is configured.
+    mode: Option<Mode>,
     /// The mode to change to.
     pub(super) wanted: Option<Mode>,
     /// Last fresh statusword, and its state.
@@ -96,7 +96,7 @@ pub(super) struct Axis {
     /// Reference minus position at the SYNC just passed, increments.
     error: f32,
     /// Position that targets count from.
-    pub(super) home: i32,
+    pub(in crate::motion) home: i32,
     /// What was commanded last.
     target: i32,
     /// 6083h and 6084h, rpm/s.
@@ -104,12 +104,12 @@ pub(super) struct Axis {
     down: u32,
     control: PositionControl,
     /// What its drive reported in this cycle.
-    pub(super) feedback: AxisFeedback,
+    pub(in crate::motion) feedback: AxisFeedback,
     pub(super) led: DriveLed,
     /// The reference at the SYNC just passed, and at the next ones: a ring, in
     /// which that of the step `n` is at `n` modulo its length.
     samples: [Sample; RING],
-    pub(super) path: Path,
+    pub(in crate::motion) path: Path,
     pub(super) machine: cia402::Axis,
 }
 
@@ -124,7 +124,7 @@ impl Axis {
         },
         machine: cia402::Axis::new(),
         seen: 0,
-        changed: None,
+        mode: None,
         wanted: None,
         path: Path::ZERO,
         samples: [Sample::at_rest(0); RING],
@@ -151,13 +151,13 @@ impl Axis {
         self.led = DriveLed::new();
     }
 
-    pub(super) fn mode(&self, config: &AxisConfig) -> Mode {
-        self.changed.unwrap_or(config.mode)
+    pub(in crate::motion) fn mode(&self) -> Mode {
+        self.mode.unwrap_or_default()
     }
 
-    /// Takes over its mode.
-    pub(super) fn take_mode(&mut self, config: &AxisConfig) {
-        let mode = self.mode(config);
+    /// Takes over a mode.
+    pub(super) fn take_mode(&mut self, mode: Mode) {
+        self.mode = Some(mode);
         self.seen &= !(BY_DRIVE | BY_POSITION);
         if mode.is_led_by_drive() {
             self.seen |= BY_DRIVE;
@@ -271,19 +271,19 @@ impl Axis {
     }
 
     /// Reference minus actual position when it was last heard, increments.
-    pub(super) fn error(&self) -> i32 {
+    pub(in crate::motion) fn error(&self) -> i32 {
         self.error as i32
     }
 
     /// Where the path stands.
-    pub(super) fn head(&self) -> i32 {
+    pub(in crate::motion) fn head(&self) -> i32 {
         fixed::round(self.path.position())
     }
 
     /// At rest where it is: the next release starts there. A torque rests at 0.
     #[inline(never)]
-    pub(super) fn hold_actual(&mut self, config: &AxisConfig) {
-        let position = match self.sent_mode(config) {
+    pub(super) fn hold_actual(&mut self) {
+        let position = match self.sent_mode() {
             Mode::CyclicTorque => 0,
             _ if self.feedback.fresh => self.feedback.position,
             _ => fixed::round(self.sample(END).position),
@@ -302,7 +302,7 @@ impl Axis {
     /// Speed from which a stop begins, rpm: of the reference, after a fault of
     /// what was last commanded; of a torque, of the motor.
     pub(super) fn speed(&self, fault: bool, config: &AxisConfig) -> f32 {
-        match self.mode(config) {
+        match self.mode() {
             mode if mode.is_led_by_drive() => 0.0,
             Mode::CyclicTorque => self.feedback.velocity as f32,
             mode if fault && mode.is_velocity() => self.target as f32,
@@ -311,7 +311,7 @@ impl Axis {
     }
 
     /// Replaces the path by a ramp from `speed` in so many cycles from the next SYNC
-    /// on. The slope of it in rpm/s.
+    /// on. The slope of it in increments per cycle squared.
     #[inline(never)]
     pub(super) fn stop(&mut self, cycles: u32, speed: f32, config: &AxisConfig) -> f32 {
         self.over = 0;
@@ -325,13 +325,14 @@ impl Axis {
             ..Knot::default()
         };
         let mut slope = 0.0;
-        if self.mode(config) == Mode::CyclicTorque {
+        if self.mode() == Mode::CyclicTorque {
             at.velocity = fixed::fixed(from.velocity);
         } else {
-            at.velocity = fixed::fixed(config.scale.velocity(speed));
+            let speed = config.scale.velocity(speed);
+            at.velocity = fixed::fixed(speed);
             let way = (at.velocity >> 1).wrapping_mul(i64::from(cycles));
             end.position = at.position.wrapping_add(way);
-            slope = config.scale.cycles(speed.abs() / cycles as f32);
+            slope = speed.abs() / cycles as f32;
         }
         self.path.restart(&at);
         self.path.push(&end, false);
@@ -346,8 +347,8 @@ impl Axis {
     }
 
     /// The mode whose RPDO is sent: the new one while the mode is being changed.
-    fn sent_mode(&self, config: &AxisConfig) -> Mode {
-        self.wanted.unwrap_or(self.mode(config))
+    fn sent_mode(&self) -> Mode {
+        self.wanted.unwrap_or(self.mode())
     }
 
     /// Fills in what is sent with the controlword `word`.
@@ -360,7 +361,7 @@ impl Axis {
         tuning: &Tuning,
         out: &mut AxisCommand,
     ) {
-        let mode = self.sent_mode(config);
+        let mode = self.sent_mode();
         let end = match lead {
             Lead::Actual if self.feedback.fresh => self.feedback.position,
             Lead::Actual => self.target,

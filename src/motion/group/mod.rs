@@ -6,6 +6,7 @@
 //! two steps the group takes orders ([`Group::order`]) and paths
 //! ([`Group::announce`], [`Group::push`]).
 
+mod advance;
 mod axis;
 mod drive_led;
 mod exchange;
@@ -16,14 +17,10 @@ pub use drive_led::SetPoint;
 pub use exchange::{AxisCommand, AxisFeedback, AxisView, Inputs, ModeWanted};
 pub use order::Order;
 
-use self::axis::{
-    AT_REST, Axes, Axis, BY_DRIVE, BY_POSITION, ENABLED, ENDED, HEARD, Lead, PASSING, PLACED,
-    REACHED, SILENT, SLOW, Seen,
-};
-use super::contract::{Cell, Event, cell};
+use self::axis::{Axes, Axis, BY_DRIVE, HEARD, Lead, REACHED, Seen};
 use super::mode::Mode;
 use super::path::{Knot, Point};
-use super::{AxisConfig, FaultCause, GroupConfig, GroupEvent, GroupState, fixed};
+use super::{GroupConfig, GroupEvent, GroupState, fixed, greater};
 use crate::cia402::{Command, ControlWord, Goal};
 use crate::time::{Duration, Instant};
 use heapless::Deque;
@@ -44,13 +41,6 @@ pub struct TooLate;
 
 const fn bit(n: usize) -> Axes {
     1 << (n % Axes::BITS as usize)
-}
-
-/// Takes the first out of a set.
-fn next(axes: &mut Axes) -> Option<usize> {
-    let first = axes.trailing_zeros();
-    *axes &= axes.wrapping_sub(1);
-    (first < Axes::BITS).then_some(first as usize)
 }
 
 /// `N` axes moved in step; see the module.
@@ -165,7 +155,7 @@ impl<const N: usize> Group<N> {
         let ramp = config.ramp_min as f32;
         for (axis, limits) in self.axes.iter_mut().zip(&config.axes) {
             axis.set_ramps(ramp, ramp);
-            axis.take_mode(limits);
+            axis.take_mode(limits.mode);
         }
     }
 
@@ -193,11 +183,10 @@ impl<const N: usize> Group<N> {
 
     /// One axis, counted from 0.
     pub fn view(&self, axis: usize) -> Option<AxisView> {
-        let config = self.config?.axes.get(axis)?;
         let bit = bit(axis);
         let axis = self.axes.get(axis)?;
         Some(AxisView {
-            mode: axis.mode(config),
+            mode: axis.mode(),
             state: (axis.seen & HEARD != 0).then_some(axis.state),
             feedback: axis.feedback,
             reference: axis.head(),
@@ -207,6 +196,20 @@ impl<const N: usize> Group<N> {
             absent: self.absent & bit != 0,
             faulted: self.faulted & bit != 0,
         })
+    }
+
+    pub(super) fn axis(&self, axis: usize) -> Option<&Axis> {
+        self.axes.get(axis)
+    }
+
+    /// Whether there are events to take.
+    pub fn has_events(&self) -> bool {
+        !self.events.queue.is_empty()
+    }
+
+    /// Puts an event to those of the group.
+    pub fn report(&mut self, event: GroupEvent) {
+        self.events.report(event);
     }
 
     /// The oldest event that was not taken yet. Take all after every step.
@@ -262,17 +265,23 @@ impl<const N: usize> Group<N> {
         self.axes.get(axis).map_or(0, |axis| axis.path.room())
     }
 
-    /// The steepest slopes of what follows, rpm/s, for the ramps of the drive, which
-    /// get room for the position loop.
+    /// The steepest slopes of what follows, increments per cycle squared, for the
+    /// ramps of the drive, which get room for the position loop.
     #[inline(never)]
     pub fn set_ramps(&mut self, axis: usize, up: f32, down: f32) {
         const PERCENT: f32 = 0.01;
-        let (Some(config), Some(axis)) = (self.config, self.axes.get_mut(axis)) else {
+        let (Some(config), Some(of)) = (self.config, self.axes.get_mut(axis)) else {
+            return;
+        };
+        let Some(limits) = config.axes.get(axis) else {
             return;
         };
         let more = config.ramp_percent as f32 * PERCENT;
-        let least = config.ramp_min as f32;
-        axis.set_ramps(least.max(up * more), least.max(down * more));
+        let ramp = |slope: f32| {
+            let slope = limits.scale.rpm_per_s(slope) * more;
+            greater(slope, config.ramp_min as f32)
+        };
+        of.set_ramps(ramp(up), ramp(down));
     }
 
     /// A set-point of profile position mode, to be handed to the drive. `false`:
@@ -280,12 +289,11 @@ impl<const N: usize> Group<N> {
     /// the axis is in another mode.
     pub fn ask(&mut self, axis: usize, set_point: &SetPoint) -> bool {
         let bit = bit(axis);
-        let config = self.config.and_then(|config| config.axes.get(axis));
-        let (Some(config), Some(axis)) = (config, self.axes.get_mut(axis)) else {
+        let Some(axis) = self.axes.get_mut(axis) else {
             return false;
         };
         let can = self.state == GroupState::Moving
-            && axis.mode(config) == Mode::ProfilePosition
+            && axis.mode() == Mode::ProfilePosition
             && axis.led.is_taken();
         if can {
             axis.led.ask(set_point);
@@ -320,15 +328,12 @@ impl<const N: usize> Group<N> {
 
     /// 6061h of an axis shows `mode`.
     pub fn confirm_mode(&mut self, confirmed: ModeWanted) {
-        let config = self
-            .config
-            .and_then(|config| config.axes.get(confirmed.axis));
-        if let (Some(config), Some(axis)) = (config, self.axes.get_mut(confirmed.axis))
+        if let Some(axis) = self.axes.get_mut(confirmed.axis)
             && axis.wanted == Some(confirmed.mode)
         {
-            axis.changed = axis.wanted.take();
-            axis.take_mode(config);
-            axis.hold_actual(config);
+            axis.wanted = None;
+            axis.take_mode(confirmed.mode);
+            axis.hold_actual();
         }
     }
 
@@ -362,7 +367,7 @@ impl<const N: usize> Group<N> {
             }
         }
         self.watch(inputs, config);
-        self.obey(inputs, config);
+        self.obey(inputs);
         self.advance(config);
         let (command, lead) = sent(self.state);
         // Quick stop leaves a drive that is braking by itself on its ramp and cannot
@@ -404,228 +409,4 @@ impl<const N: usize> Group<N> {
             false => 0,
         }
     }
-
-    /// What an event does, as the table has it. `false`: it is refused.
-    fn happen(&mut self, event: Event) -> bool {
-        match cell(self.state, event) {
-            Cell::Stay => {}
-            Cell::Refuse => return false,
-            Cell::Go(to) => self.enter(to),
-        }
-        true
-    }
-
-    #[inline(never)]
-    fn enter(&mut self, to: GroupState) {
-        let from = core::mem::replace(&mut self.state, to);
-        self.since = 0;
-        self.events.report(GroupEvent::State { from, to });
-        self.announced = 0;
-        // What came to rest before does not count.
-        for axis in &mut self.axes {
-            axis.seen &= !PASSING;
-        }
-        match to {
-            GroupState::Enabling => {
-                self.faulted = 0;
-                self.excluded = 0;
-                self.coasting = 0;
-                self.busy = 0;
-                self.axes.iter_mut().for_each(Axis::restart);
-                self.set_stage(Goal::Disabled);
-            }
-            GroupState::Disabling => self.set_stage(Goal::Disabled),
-            GroupState::Stopping | GroupState::Halt => self.stop(false),
-            GroupState::FaultStop => {
-                self.network_was_down = false;
-                // Axes that their drives do not hold enabled are excluded; that is
-                // news only if they were.
-                self.excluded = !(self.which(ENABLED) & self.here());
-                self.coasting = self.absent;
-                if from == GroupState::Enabling {
-                    self.coasting = self.excluded;
-                }
-                self.stop(true);
-            }
-            // Where the drives come to rest is theirs to say.
-            GroupState::QuickStop => self.hold_actual(),
-            // At the end of a motion the axes are where they should be.
-            GroupState::Standby if from != GroupState::Moving => self.hold_actual(),
-            _ => {}
-        }
-    }
-
-    /// Ramps from the next SYNC on, equally long for all axes.
-    fn stop(&mut self, fault: bool) {
-        let Some(config) = self.config else { return };
-        let mut speeds = [0.0; N];
-        let mut fastest = 0.0f32;
-        let axes = self.axes.iter().zip(&config.axes).zip(&mut speeds);
-        for (n, ((axis, config), speed)) in axes.enumerate() {
-            if self.here() & !self.excluded & bit(n) != 0 {
-                *speed = axis.speed(fault, config);
-                fastest = fastest.max(speed.abs());
-            }
-        }
-        let cycles = stop_cycles(fastest, config).max(1);
-        for (n, speed) in speeds.into_iter().enumerate() {
-            let (Some(axis), Some(config)) = (self.axes.get_mut(n), config.axes.get(n)) else {
-                continue;
-            };
-            let slope = axis.stop(cycles, speed, config);
-            if axis.seen & BY_POSITION != 0 {
-                self.set_ramps(n, slope, slope);
-            }
-        }
-    }
-
-    fn set_stage(&mut self, stage: Goal) {
-        self.stage = stage;
-        self.staged = 0;
-        for axis in &mut self.axes {
-            axis.seen &= !REACHED;
-            axis.machine.set_goal(stage, self.now);
-        }
-    }
-
-    #[inline(never)]
-    fn hold_actual(&mut self) {
-        let Some(config) = self.config else { return };
-        for (axis, config) in self.axes.iter_mut().zip(&config.axes) {
-            axis.hold_actual(config);
-        }
-    }
-
-    /// What goes on by itself in each state.
-    fn advance(&mut self, config: &GroupConfig<N>) {
-        let done = match self.state {
-            GroupState::Idle | GroupState::Standby | GroupState::Faulted | GroupState::Halt => {
-                false
-            }
-            GroupState::Enabling | GroupState::Disabling => self.next_stage(),
-            GroupState::Moving | GroupState::Homing => {
-                self.arrive(true, config) && self.state == GroupState::Homing
-            }
-            GroupState::Stopping => self.arrive(false, config),
-            GroupState::ModeChange => match self.next_wanted() {
-                None => true,
-                Some(ModeWanted { axis, mode }) => {
-                    if self.since > config.cycles(config.enable_timeout) {
-                        let cause = FaultCause::ModeNotConfirmed { mode };
-                        self.fault(Some(axis as u8), cause, Event::Late);
-                    }
-                    false
-                }
-            },
-            GroupState::QuickStop | GroupState::FaultStop => self.comes_to_rest(config),
-        };
-        if done {
-            self.happen(Event::Done);
-        }
-    }
-
-    /// All axes reach a state before the next transition is commanded.
-    fn next_stage(&mut self) -> bool {
-        let here = self.here();
-        if here & !self.which(REACHED) != 0 {
-            return false;
-        }
-        let next = match self.stage {
-            _ if self.state == GroupState::Disabling => return true,
-            Goal::Disabled => Goal::Ready,
-            Goal::Ready => Goal::SwitchedOn,
-            Goal::SwitchedOn => Goal::Enabled,
-            Goal::Enabled | Goal::QuickStop => {
-                // A drive that was switched off in motion may have been enabled
-                // before its axis stood: it brakes first.
-                let rest = here & !self.which(SLOW) == 0;
-                for axis in self.axes.iter_mut().filter(|_| rest) {
-                    axis.home = axis.feedback.position;
-                }
-                return rest;
-            }
-        };
-        self.set_stage(next);
-        false
-    }
-
-    /// Whether every axis has come to rest, `on_target` or wherever it is.
-    fn arrive(&mut self, on_target: bool, config: &GroupConfig<N>) -> bool {
-        let mut waiting = self.here() & !self.announced;
-        if on_target {
-            waiting &= self.busy;
-        }
-        // The path of an axis that its drive leads is over all the time.
-        let mut ready = waiting & self.which(ENDED);
-        while let Some(n) = next(&mut ready) {
-            let (Some(axis), Some(limits)) = (self.axes.get_mut(n), config.axes.get(n)) else {
-                continue;
-            };
-            let near = on_target && axis.seen & BY_POSITION != 0;
-            let rest = if near { PLACED } else { AT_REST };
-            let outcome = if on_target && axis.seen & BY_DRIVE != 0 {
-                let limit = config.cycles(config.enable_timeout);
-                axis.led.outcome(axis.mode(limits), limit)
-            } else if axis.seen & rest != 0 {
-                Ok(true)
-            } else if axis.waited() > config.cycles(config.settle_timeout) {
-                let error = axis.error();
-                Err(FaultCause::NotArrived { error })
-            } else {
-                Ok(false)
-            };
-            match outcome {
-                Ok(false) => continue,
-                Err(cause) => {
-                    self.fault(Some(n as u8), cause, Event::Late);
-                    return false;
-                }
-                Ok(true) => {}
-            }
-            waiting &= !bit(n);
-            self.busy &= !bit(n);
-            if on_target {
-                let mut error = 0;
-                if near {
-                    error = axis.error();
-                } else if self.state == GroupState::Homing {
-                    axis.home = 0;
-                }
-                self.events.report(GroupEvent::Arrived {
-                    axis: n as u8,
-                    target: axis.head(),
-                    error,
-                });
-            }
-        }
-        self.announced == 0 && waiting == 0
-    }
-
-    /// After a quick stop or a fault: waits for standstill, for as long as an axis
-    /// may take. Axes that report nothing are not waited for.
-    fn comes_to_rest(&mut self, config: &GroupConfig<N>) -> bool {
-        let mut moving = self.here() & !(self.which(AT_REST) | self.which(SILENT));
-        if moving == 0 {
-            return true;
-        }
-        let fastest = |most: u32, axis: &AxisConfig| most.max(axis.velocity_max);
-        let fastest = config.axes.iter().fold(0, fastest);
-        let patience = config.cycles(config.settle_timeout) + stop_cycles(fastest as f32, config);
-        if self.since > patience {
-            while let Some(n) = next(&mut moving) {
-                let velocity = self.axes.get(n).map_or(0, |axis| axis.feedback.velocity);
-                let axis = n as u8;
-                self.events.report(GroupEvent::NotAtRest { axis, velocity });
-            }
-            self.happen(Event::Late);
-        }
-        false
-    }
-}
-
-/// Whole cycles to come from `rpm` to rest.
-fn stop_cycles<const N: usize>(rpm: f32, group: &GroupConfig<N>) -> u32 {
-    const SECOND_US: f32 = 1e6;
-    let per_cycle = group.stop_deceleration as f32 * (group.cycle.as_micros() as f32 / SECOND_US);
-    fixed::ceil(rpm.abs() / per_cycle)
 }

@@ -1,10 +1,10 @@
 //! Orders to the group, judged at once and carried out in the next step.
 
 use super::axis::{FRESH, SLOW};
-use super::{Group, Inputs, bit, next};
+use super::{Group, Inputs, bit};
 use crate::motion::contract::{Cell, Event, cell};
 use crate::motion::mode::Mode;
-use crate::motion::{GroupConfig, GroupEvent, GroupState, Refusal};
+use crate::motion::{GroupEvent, GroupState, Reason, Refusal, next};
 
 /// What the group is told to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,6 +58,8 @@ impl Order {
     }
 }
 
+const NOT_READY: Refusal = Refusal::whole(Reason::Network, 0, 1);
+
 impl<const N: usize> Group<N> {
     /// Takes an order for the next step. A stop replaces what was ordered before.
     ///
@@ -73,14 +75,14 @@ impl<const N: usize> Group<N> {
             return Ok(());
         }
         if cell(self.state, event) == Cell::Refuse {
-            return Err(Refusal::NotIn(self.state));
+            return Err(Refusal::not_in(self.state));
         }
         match order {
             Order::Finish if self.state != GroupState::Moving || !self.all_arrived() => {
-                return Err(Refusal::Busy);
+                return Err(Refusal::BUSY);
             }
             Order::Stop | Order::QuickStop => {}
-            _ if self.ordered.event().is_some() => return Err(Refusal::Busy),
+            _ if self.ordered.event().is_some() => return Err(Refusal::BUSY),
             _ => self.permit(order)?,
         }
         self.unwanted |= event == Event::QuickStop;
@@ -91,11 +93,11 @@ impl<const N: usize> Group<N> {
     /// Whether all axes can do what is ordered.
     fn permit(&self, order: Order) -> Result<(), Refusal> {
         let Some(config) = self.config else {
-            return Err(Refusal::NetworkNotReady);
+            return Err(NOT_READY);
         };
         let mut look = self.here();
         let (wanted, other) = match order {
-            Order::Reset if !self.network_ready => return Err(Refusal::NetworkNotReady),
+            Order::Reset if !self.network_ready => return Err(NOT_READY),
             Order::Release => (0, Mode::Homing),
             Order::SetMode { axes, mode } => (axes, mode),
             Order::Home { axes, .. } => {
@@ -108,34 +110,28 @@ impl<const N: usize> Group<N> {
             let (Some(of), Some(limits)) = (self.axes.get(n), config.axes.get(n)) else {
                 continue;
             };
-            let (axis, mode) = (n as u8, of.mode(limits));
-            if matches!(order, Order::Home { .. }) {
-                if mode != Mode::Homing {
-                    return Err(Refusal::WrongMode { axis, mode });
+            let (reason, value, allowed) = if matches!(order, Order::Home { .. }) {
+                if of.mode() == Mode::Homing {
+                    continue;
                 }
+                (Reason::WrongMode, of.mode() as u32, Mode::Homing as u32)
+            } else if of.seen & FRESH == 0 {
+                (Reason::NotFresh, 0, 1)
+            } else if of.seen & SLOW == 0 {
+                let speed = of.feedback.velocity.unsigned_abs();
+                (Reason::NotAtRest, speed, config.standstill_rpm)
+            } else if wanted & bit(n) != 0 && !other.is_in(limits.modes) {
+                (Reason::NoSuchMode, other as u32, limits.modes)
+            } else {
                 continue;
-            }
-            if of.seen & FRESH == 0 {
-                return Err(Refusal::NotFresh { axis });
-            }
-            if of.seen & SLOW == 0 {
-                let velocity = of.feedback.velocity;
-                return Err(Refusal::NotAtRest { axis, velocity });
-            }
-            let supported = limits.modes;
-            if wanted & bit(n) != 0 && !other.is_in(supported) {
-                return Err(Refusal::ModeNotSupported {
-                    axis,
-                    mode: other,
-                    supported,
-                });
-            }
+            };
+            return Err(Refusal::of(n as u8, reason, value, allowed));
         }
         Ok(())
     }
 
     /// The network, and what was ordered.
-    pub(super) fn obey(&mut self, inputs: &Inputs, config: &GroupConfig<N>) {
+    pub(super) fn obey(&mut self, inputs: &Inputs) {
         let ready = inputs.network_ready;
         self.network_ready = ready;
         self.network_was_down |= !ready || self.faulted & inputs.absent != 0;
@@ -159,15 +155,15 @@ impl<const N: usize> Group<N> {
         let before = self.state;
         if !self.happen(event) {
             // Something came in between.
-            let why = Refusal::NotIn(before);
+            let why = Refusal::not_in(before);
             self.events.report(GroupEvent::ReleaseRefused(why));
             return;
         }
-        self.carry_out(order, config);
+        self.carry_out(order);
     }
 
     /// What a transition needs to know of its order.
-    fn carry_out(&mut self, order: Order, config: &GroupConfig<N>) {
+    fn carry_out(&mut self, order: Order) {
         let mut of = match (order, self.state) {
             (Order::Release, GroupState::Moving) => {
                 self.hold_actual();
@@ -182,14 +178,14 @@ impl<const N: usize> Group<N> {
             self.busy |= of;
         }
         while let Some(n) = next(&mut of) {
-            let (Some(axis), Some(limits)) = (self.axes.get_mut(n), config.axes.get(n)) else {
+            let Some(axis) = self.axes.get_mut(n) else {
                 continue;
             };
             match order {
                 Order::Home { limit, .. } => axis.led.home(limit),
                 Order::SetMode { mode, .. } => {
-                    axis.wanted = (axis.mode(limits) != mode).then_some(mode);
-                    axis.hold_actual(limits);
+                    axis.wanted = (axis.mode() != mode).then_some(mode);
+                    axis.hold_actual();
                 }
                 _ => {}
             }

@@ -1,10 +1,11 @@
 //! Supervision: what stops the group.
 
 use super::axis::{BY_DRIVE, BY_POSITION, ENABLED, FAILED, FRESH, HEARD, REACHED, SILENT, SOUND};
-use super::{Event, Group, Inputs, bit, next};
+use super::{Group, Inputs, bit};
 use crate::cia402::{Goal, StatusWord, Timeout};
+use crate::motion::contract::Event;
 use crate::motion::mode::Mode;
-use crate::motion::{FaultCause, GroupConfig, GroupEvent, GroupState};
+use crate::motion::{FaultCause, GroupConfig, GroupEvent, GroupState, next};
 
 impl<const N: usize> Group<N> {
     /// Looks for faults in what was told and reported in this step.
@@ -53,7 +54,7 @@ impl<const N: usize> Group<N> {
         let (axis, limits) = (self.axes.get_mut(n)?, config.axes.get(n)?);
         let status = StatusWord(axis.feedback.statusword);
         let faulted = self.faulted & bit(n) != 0;
-        let mode = axis.mode(limits);
+        let mode = axis.mode();
         let (seen, by_drive) = (axis.seen, axis.seen & BY_DRIVE != 0);
         if by_drive
             && matches!(state, GroupState::Moving | GroupState::Homing)

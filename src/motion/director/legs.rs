@@ -1,0 +1,220 @@
+//! From the steps of a program and from single moves to the paths of the group.
+
+use super::format::{RELATIVE, Step};
+use super::{Director, LATER_MAX, LEAD, Phase, format, limits};
+use crate::motion::group::{Group, SetPoint};
+use crate::motion::mode::Mode;
+use crate::motion::program::{AxisMove, Reason, Refusal, within};
+use crate::motion::{fixed, next, plan};
+
+/// Points of a path that are handed over in one look, since the group waits.
+const POINTS: usize = 2;
+
+impl<const N: usize> Director<N> {
+    pub(super) fn clear(&mut self) {
+        for leg in &mut self.legs {
+            leg.set = None;
+        }
+    }
+
+    /// The legs of a step.
+    pub(super) fn set_legs(&mut self, group: &Group<N>, step: &Step<'_>) -> Result<bool, Refusal> {
+        self.clear();
+        let (mut left, mut member) = (step.axes, 0);
+        while let Some(axis) = next(&mut left) {
+            let part = step.part(member);
+            self.set_leg(group, axis, &part, step.has(RELATIVE), step.value)?;
+            member += 1;
+        }
+        Ok(false)
+    }
+
+    /// The leg of an axis, checked against its limits.
+    #[inline(never)]
+    pub(super) fn set_leg(
+        &mut self,
+        group: &Group<N>,
+        axis: usize,
+        part: &AxisMove,
+        relative: bool,
+        jerk: u32,
+    ) -> Result<(), Refusal> {
+        let number = axis as u8;
+        let (Some(limits), Some(of), Some(leg)) = (
+            limits(self.config).get(axis),
+            group.axis(axis),
+            self.legs.get_mut(axis),
+        ) else {
+            return Ok(());
+        };
+        let torque = of.mode() == Mode::CyclicTorque;
+        let (home, scale) = if torque {
+            (0, limits.scale.of_units())
+        } else {
+            (of.home, limits.scale)
+        };
+        let mut target = part.target;
+        if relative {
+            let end = fixed::round(of.path.end());
+            target = target.saturating_add(end.wrapping_sub(home));
+        }
+        part.keeps(number, limits)?;
+        if torque {
+            let value = target.unsigned_abs().max(1);
+            within(number, Reason::Torque, value, limits.torque_max.into())?;
+        } else {
+            limits.reaches(number, target)?;
+        }
+        leg.set = Some(part.set);
+        leg.target = target.wrapping_add(home);
+        [leg.velocity, leg.acceleration, leg.deceleration] = part.limits(scale);
+        leg.jerk = scale.per_cycle(scale.acceleration(jerk as f32));
+        Ok(())
+    }
+
+    /// Where the paths will stand when the plan begins, and what is left to the
+    /// drives; `false` if one has not taken its last set-point yet.
+    #[inline(never)]
+    pub(super) fn predict(
+        &mut self,
+        group: &mut Group<N>,
+        step: &Step<'_>,
+    ) -> Result<bool, Refusal> {
+        let lead = LEAD + self.later;
+        self.start = group.count().wrapping_add(lead);
+        for (axis, leg) in self.legs.iter_mut().enumerate() {
+            let Some(of) = group.axis(axis) else {
+                break;
+            };
+            let mode = of.mode();
+            leg.home = of.home;
+            leg.from = of.path.ahead(lead - 1);
+            if self.path {
+                if step.axes >> axis & 1 != 0 && !mode.has_position() {
+                    // Its drive moves it by itself, or it is no motion.
+                    let allowed = Mode::WITH_POSITION;
+                    return Err(Refusal::of(axis as u8, Reason::Mode, mode as u32, allowed));
+                }
+            } else if leg.set.is_some() && mode == Mode::ProfilePosition {
+                group.set_ramps(axis, leg.acceleration, leg.deceleration);
+                let set_point = SetPoint {
+                    target: leg.target,
+                    immediately: true,
+                    relative: false,
+                };
+                if !group.ask(axis, &set_point) {
+                    return Ok(false);
+                }
+                leg.set = None;
+            }
+        }
+        Ok(true)
+    }
+
+    /// Plans what there is to plan, and checks it against the travel from where the
+    /// axes are.
+    pub fn think(&mut self, program: &[u8]) {
+        let step = Step::at(format::steps(program), self.at);
+        self.phase = Phase::Planned;
+        let result = self.plan(&step);
+        self.judge(result);
+    }
+
+    fn plan(&mut self, step: &Step<'_>) -> Result<bool, Refusal> {
+        if !self.path
+            && let Err(axis) = plan::plan(&mut self.legs)
+        {
+            return Err(Refusal::of(axis, Reason::Time, u32::MAX, plan::CYCLES_MAX));
+        }
+        let mut member = 0;
+        let all = self.legs.iter_mut().zip(limits(self.config));
+        for (axis, (leg, limits)) in (0..).zip(all) {
+            let from = fixed::round(leg.from.position).wrapping_sub(leg.home);
+            if !self.path {
+                if leg.set.is_some() && leg.turn != 0.0 {
+                    limits.reaches(axis, from.saturating_add(leg.turn as i32))?;
+                }
+            } else if step.axes >> axis & 1 != 0 {
+                let told = step.begin(member);
+                if !step.has(RELATIVE) && from != told {
+                    return Err(Refusal::of(axis, Reason::Begin, from as u32, told as u32));
+                }
+                let slope = step.check_path(axis, member, limits, Some(from))?;
+                (leg.up, leg.down) = (slope, slope);
+                member += 1;
+            }
+        }
+        Ok(true)
+    }
+
+    /// Hands the plan over. Too late for its first step, it is made anew.
+    pub fn act(&mut self, group: &mut Group<N>, program: &[u8]) {
+        match self.phase {
+            Phase::Failed => return self.give_up(group),
+            Phase::Planned => {}
+            _ => return,
+        }
+        let step = Step::at(format::steps(program), self.at);
+        let mut axes = step.axes;
+        if !self.path {
+            axes = 0;
+            for (axis, leg) in self.legs.iter().enumerate() {
+                axes |= u32::from(leg.set.is_some()) << axis;
+            }
+        }
+        // A path begins at rest: the sooner, the better.
+        let start = if self.path {
+            group.count().wrapping_add(1)
+        } else {
+            self.start
+        };
+        if group.announce(start, axes).is_err() {
+            self.later = LATER_MAX.min(self.later * 2 + LEAD);
+            self.phase = Phase::Plan;
+            return;
+        }
+        for (axis, leg) in self.legs.iter().enumerate() {
+            if axes >> axis & 1 == 0 {
+                continue;
+            }
+            group.set_ramps(axis, leg.up, leg.down);
+            if !self.path {
+                for knot in &leg.knots {
+                    group.push(axis, knot);
+                }
+            }
+        }
+        self.phase = Phase::Arriving;
+        if self.path {
+            (self.point, self.period) = (0, 0);
+            self.phase = Phase::Path;
+            self.feed(group, &step);
+        }
+    }
+
+    /// Hands over the next points of a path, if there is room.
+    pub(super) fn feed(&mut self, group: &mut Group<N>, step: &Step<'_>) {
+        for _ in 0..POINTS {
+            if self.period == step.periods() {
+                self.phase = Phase::Arriving;
+                return;
+            }
+            let (mut left, mut member) = (step.axes, 0);
+            while let Some(axis) = next(&mut left) {
+                if group.room(axis) == 0 {
+                    return;
+                }
+                let mut knot = step.point(member, self.point);
+                let begin = self.legs.get(axis).map_or(0, |leg| leg.from.position);
+                knot.position = knot.position.wrapping_add(begin);
+                group.push(axis, &knot);
+                member += 1;
+            }
+            self.point += 1;
+            if self.point == step.points() {
+                self.point = 0;
+                self.period += 1;
+            }
+        }
+    }
+}

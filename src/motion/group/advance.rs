@@ -1,0 +1,234 @@
+//! What goes on by itself in each state, and how a state is entered.
+
+use super::axis::{
+    AT_REST, Axis, BY_DRIVE, BY_POSITION, ENABLED, ENDED, PASSING, PLACED, REACHED, SILENT, SLOW,
+};
+use super::{Group, ModeWanted, bit};
+use crate::cia402::Goal;
+use crate::motion::contract::{Cell, Event, cell};
+use crate::motion::{
+    AxisConfig, FaultCause, GroupConfig, GroupEvent, GroupState, fixed, greater, next,
+};
+
+impl<const N: usize> Group<N> {
+    /// What an event does, as the table has it. `false`: it is refused.
+    pub(super) fn happen(&mut self, event: Event) -> bool {
+        match cell(self.state, event) {
+            Cell::Stay => {}
+            Cell::Refuse => return false,
+            Cell::Go(to) => self.enter(to),
+        }
+        true
+    }
+
+    #[inline(never)]
+    fn enter(&mut self, to: GroupState) {
+        let from = core::mem::replace(&mut self.state, to);
+        self.since = 0;
+        self.events.report(GroupEvent::State { from, to });
+        self.announced = 0;
+        // What came to rest before does not count.
+        for axis in &mut self.axes {
+            axis.seen &= !PASSING;
+        }
+        match to {
+            GroupState::Enabling => {
+                self.faulted = 0;
+                self.excluded = 0;
+                self.coasting = 0;
+                self.busy = 0;
+                self.axes.iter_mut().for_each(Axis::restart);
+                self.set_stage(Goal::Disabled);
+            }
+            GroupState::Disabling => self.set_stage(Goal::Disabled),
+            GroupState::Stopping | GroupState::Halt => self.stop(false),
+            GroupState::FaultStop => {
+                self.network_was_down = false;
+                // Axes that their drives do not hold enabled are excluded; that is
+                // news only if they were.
+                self.excluded = !(self.which(ENABLED) & self.here());
+                self.coasting = self.absent;
+                if from == GroupState::Enabling {
+                    self.coasting = self.excluded;
+                }
+                self.stop(true);
+            }
+            // Where the drives come to rest is theirs to say.
+            GroupState::QuickStop => self.hold_actual(),
+            // At the end of a motion the axes are where they should be.
+            GroupState::Standby if from != GroupState::Moving => self.hold_actual(),
+            _ => {}
+        }
+    }
+
+    /// Ramps from the next SYNC on, equally long for all axes.
+    fn stop(&mut self, fault: bool) {
+        let Some(config) = self.config else { return };
+        let mut speeds = [0.0; N];
+        let mut fastest = 0.0;
+        let axes = self.axes.iter().zip(&config.axes).zip(&mut speeds);
+        for (n, ((axis, config), speed)) in axes.enumerate() {
+            if self.here() & !self.excluded & bit(n) != 0 {
+                *speed = axis.speed(fault, config);
+                fastest = greater(fastest, speed.abs());
+            }
+        }
+        let cycles = stop_cycles(fastest, config).max(1);
+        for (n, speed) in speeds.into_iter().enumerate() {
+            let (Some(axis), Some(config)) = (self.axes.get_mut(n), config.axes.get(n)) else {
+                continue;
+            };
+            let slope = axis.stop(cycles, speed, config);
+            if axis.seen & BY_POSITION != 0 {
+                self.set_ramps(n, slope, slope);
+            }
+        }
+    }
+
+    fn set_stage(&mut self, stage: Goal) {
+        self.stage = stage;
+        self.staged = 0;
+        for axis in &mut self.axes {
+            axis.seen &= !REACHED;
+            axis.machine.set_goal(stage, self.now);
+        }
+    }
+
+    #[inline(never)]
+    pub(super) fn hold_actual(&mut self) {
+        self.axes.iter_mut().for_each(Axis::hold_actual);
+    }
+
+    /// What goes on by itself in each state.
+    pub(super) fn advance(&mut self, config: &GroupConfig<N>) {
+        let done = match self.state {
+            GroupState::Idle | GroupState::Standby | GroupState::Faulted | GroupState::Halt => {
+                false
+            }
+            GroupState::Enabling | GroupState::Disabling => self.next_stage(),
+            GroupState::Moving | GroupState::Homing => {
+                self.arrive(true, config) && self.state == GroupState::Homing
+            }
+            GroupState::Stopping => self.arrive(false, config),
+            GroupState::ModeChange => match self.next_wanted() {
+                None => true,
+                Some(ModeWanted { axis, mode }) => {
+                    if self.since > config.cycles(config.enable_timeout) {
+                        let cause = FaultCause::ModeNotConfirmed { mode };
+                        self.fault(Some(axis as u8), cause, Event::Late);
+                    }
+                    false
+                }
+            },
+            GroupState::QuickStop | GroupState::FaultStop => self.comes_to_rest(config),
+        };
+        if done {
+            self.happen(Event::Done);
+        }
+    }
+
+    /// All axes reach a state before the next transition is commanded.
+    fn next_stage(&mut self) -> bool {
+        let here = self.here();
+        if here & !self.which(REACHED) != 0 {
+            return false;
+        }
+        let next = match self.stage {
+            _ if self.state == GroupState::Disabling => return true,
+            Goal::Disabled => Goal::Ready,
+            Goal::Ready => Goal::SwitchedOn,
+            Goal::SwitchedOn => Goal::Enabled,
+            Goal::Enabled | Goal::QuickStop => {
+                // A drive that was switched off in motion may have been enabled
+                // before its axis stood: it brakes first.
+                let rest = here & !self.which(SLOW) == 0;
+                for axis in self.axes.iter_mut().filter(|_| rest) {
+                    axis.home = axis.feedback.position;
+                }
+                return rest;
+            }
+        };
+        self.set_stage(next);
+        false
+    }
+
+    /// Whether every axis has come to rest, `on_target` or wherever it is.
+    fn arrive(&mut self, on_target: bool, config: &GroupConfig<N>) -> bool {
+        let mut waiting = self.here() & !self.announced;
+        if on_target {
+            waiting &= self.busy;
+        }
+        // The path of an axis that its drive leads is over all the time.
+        let mut ready = waiting & self.which(ENDED);
+        while let Some(n) = next(&mut ready) {
+            let Some(axis) = self.axes.get_mut(n) else {
+                break;
+            };
+            let near = on_target && axis.seen & BY_POSITION != 0;
+            let rest = if near { PLACED } else { AT_REST };
+            let outcome = if on_target && axis.seen & BY_DRIVE != 0 {
+                let limit = config.cycles(config.enable_timeout);
+                axis.led.outcome(axis.mode(), limit)
+            } else if axis.seen & rest != 0 {
+                Ok(true)
+            } else if axis.waited() > config.cycles(config.settle_timeout) {
+                let error = axis.error();
+                Err(FaultCause::NotArrived { error })
+            } else {
+                Ok(false)
+            };
+            match outcome {
+                Ok(false) => continue,
+                Err(cause) => {
+                    self.fault(Some(n as u8), cause, Event::Late);
+                    return false;
+                }
+                Ok(true) => {}
+            }
+            waiting &= !bit(n);
+            self.busy &= !bit(n);
+            if on_target {
+                let mut error = 0;
+                if near {
+                    error = axis.error();
+                } else if self.state == GroupState::Homing {
+                    axis.home = 0;
+                }
+                self.events.report(GroupEvent::Arrived {
+                    axis: n as u8,
+                    target: axis.head(),
+                    error,
+                });
+            }
+        }
+        self.announced == 0 && waiting == 0
+    }
+
+    /// After a quick stop or a fault: waits for standstill, for as long as an axis
+    /// may take. Axes that report nothing are not waited for.
+    fn comes_to_rest(&mut self, config: &GroupConfig<N>) -> bool {
+        let mut moving = self.here() & !(self.which(AT_REST) | self.which(SILENT));
+        if moving == 0 {
+            return true;
+        }
+        let fastest = |most: u32, axis: &AxisConfig| most.max(axis.velocity_max);
+        let fastest = config.axes.iter().fold(0, fastest);
+        let patience = config.cycles(config.settle_timeout) + stop_cycles(fastest as f32, config);
+        if self.since > patience {
+            while let Some(n) = next(&mut moving) {
+                let velocity = self.axes.get(n).map_or(0, |axis| axis.feedback.velocity);
+                let axis = n as u8;
+                self.events.report(GroupEvent::NotAtRest { axis, velocity });
+            }
+            self.happen(Event::Late);
+        }
+        false
+    }
+}
+
+/// Whole cycles to come from `rpm` to rest.
+fn stop_cycles<const N: usize>(rpm: f32, group: &GroupConfig<N>) -> u32 {
+    const SECOND_US: f32 = 1e6;
+    let per_cycle = group.stop_deceleration as f32 * (group.cycle.as_micros() as f32 / SECOND_US);
+    fixed::ceil(rpm.abs() / per_cycle)
+}
