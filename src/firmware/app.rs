@@ -237,7 +237,7 @@ mod app {
         axes: &'static mut MaybeUninit<Axes>,
     ) -> &'static mut Axes {
         group.configure(&derived::GROUP);
-        axes.write(Axes::new(NETWORK, group))
+        axes.write(Axes::new(group))
     }
 
     fn configured(director: &'static mut Director<AXES>) -> &'static mut Director<AXES> {

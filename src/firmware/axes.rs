@@ -2,30 +2,16 @@
 
 use crate::{
     control::Control,
-    derived::{AXES, AXIS_BUSES, GROUP, PDOS, RAMPS_ON_CHANGE, RPDOS_AFTER_SYNC},
+    derived::{AXES, AXIS_BUSES, GROUP, NETWORK, PDOS, RAMPS_ON_CHANGE, RPDOS_AFTER_SYNC},
     lines::Lines,
 };
 use canmaster::{
     cia402::StatusWord,
     design,
     master::{Cycle, MasterOd, Overload, Ramps, TpdoSlot},
-    motion::{
-        AxisCommand, AxisFeedback, FaultCause, Group, GroupState, Inputs, Order, Speedometer,
-    },
-    network::Network,
+    motion::{AxisCommand, AxisFeedback, Cause, Group, GroupState, Inputs, Order, Speedometer},
 };
 use rtic::Mutex;
-
-/// For the axes whose TPDOs carry no velocity.
-const SPEEDOMETERS: [Speedometer; AXES] = {
-    let mut all = [Speedometer::new(1, GROUP.cycle); AXES];
-    let mut n = 0;
-    while n < AXES {
-        all[n] = Speedometer::new(GROUP.axes[n].increments_per_turn, GROUP.cycle);
-        n += 1;
-    }
-    all
-};
 
 /// No axis has this number.
 const ALL_AXES: usize = usize::MAX;
@@ -33,7 +19,6 @@ const ALL_AXES: usize = usize::MAX;
 /// The group with what surrounds it.
 #[expect(unreachable_pub, reason = "RTIC wants shared resources to be public")]
 pub struct Axes {
-    network: &'static Network,
     pub(crate) group: &'static mut Group<AXES>,
     /// The button was pressed while nothing moved: `sdo_configurator` runs the
     /// program.
@@ -43,27 +28,28 @@ pub struct Axes {
     overload: Overload,
     /// RPDOs of the last cycle did not get out.
     unsent: bool,
+    /// For the axes whose TPDOs carry no velocity.
     speed: [Speedometer; AXES],
 }
 
 impl Axes {
-    pub(crate) fn new(network: &'static Network, group: &'static mut Group<AXES>) -> Axes {
+    pub(crate) fn new(group: &'static mut Group<AXES>) -> Axes {
         Axes {
-            network,
             group,
             pressed: false,
             feedback: [AxisFeedback::default(); AXES],
             ramps: Ramps::new(),
             overload: Overload::new(design::LATE_CYCLES_MAX),
             unsent: false,
-            speed: SPEEDOMETERS,
+            speed: [Speedometer::new(); AXES],
         }
     }
 
     /// Takes in the TPDOs of a cycle.
     pub(crate) fn read(&mut self, cycle: &Cycle, od: &mut impl Mutex<T = MasterOd<AXES>>) {
         let axes = self.feedback.iter_mut().zip(&mut self.speed);
-        for (axis, ((feedback, speed), pdos)) in axes.zip(&PDOS).enumerate() {
+        let axes = axes.zip(&PDOS).zip(&GROUP.axes);
+        for (axis, (((feedback, speed), pdos), limits)) in axes.enumerate() {
             let (Some(first), Some(second)) = (TpdoSlot::new(axis, 0), TpdoSlot::new(axis, 1))
             else {
                 continue;
@@ -71,7 +57,7 @@ impl Axes {
             let fresh = !cycle.missing.contains(first) && !cycle.missing.contains(second);
             *feedback = od.lock(|od| pdos.feedback(od.image(axis), fresh));
             if fresh && !pdos.has_velocity() {
-                feedback.velocity = speed.at(feedback.position);
+                feedback.velocity = speed.at(feedback.position, &limits.scale);
             }
         }
     }
@@ -95,7 +81,7 @@ impl Axes {
         let late = self.overload.cycle(cycle.passed, unsent);
         let led = !matches!(state, GroupState::Idle | GroupState::Faulted);
         let late = late.filter(|_| led && state != GroupState::FaultStop);
-        let late = late.map(|cycles| (ALL_AXES, FaultCause::CyclesLate { cycles }));
+        let late = late.map(|cycles| (ALL_AXES, Cause::CyclesLate.with(cycles.into())));
         let inputs = Inputs {
             network_ready: control.network_ready
                 && control.leads()
@@ -147,7 +133,7 @@ impl Axes {
             }
         });
         let due = self.ramps.due(commands);
-        let nodes = self.network.nodes.iter().zip(&PDOS);
+        let nodes = NETWORK.nodes.iter().zip(&PDOS);
         for (axis, ((node, pdos), command)) in nodes.zip(commands).enumerate() {
             let on_change = RAMPS_ON_CHANGE.get(axis).is_some_and(|on| *on);
             let ramps = match on_change && due != Some(axis) {

@@ -15,7 +15,7 @@ use canmaster::{
     boot::{self, Action, NetworkBoot},
     design,
     device::{Event, Setting},
-    motion::{FaultCause, GroupEvent, GroupState},
+    motion::{Cause, FaultCause, GroupEvent, GroupState},
     nmt::{Command, NodeControl, Service, State, Target},
 };
 use core::sync::atomic::Ordering::Relaxed;
@@ -191,7 +191,11 @@ impl Silent {
         match *event {
             GroupEvent::Fault {
                 axis: Some(axis),
-                cause: FaultCause::TpdoMissing { .. },
+                cause:
+                    FaultCause {
+                        cause: Cause::TpdoMissing,
+                        ..
+                    },
             } => self.0 |= 1 << axis,
             GroupEvent::State {
                 to: GroupState::Faulted,

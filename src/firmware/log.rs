@@ -8,7 +8,7 @@ use canmaster::{
     boot::Event,
     emcy::EmcyCode,
     master::{Notice, Report},
-    motion::{FaultCause, GroupEvent, GroupState},
+    motion::{Cause, FaultCause, GroupEvent, GroupState},
     network::{Network, Node},
 };
 use canmaster_words::in_log;
@@ -267,7 +267,11 @@ impl Log {
         let (level, line) = match event {
             // The controller's state says more.
             GroupEvent::Fault {
-                cause: FaultCause::NetworkLost,
+                cause:
+                    FaultCause {
+                        cause: Cause::NetworkLost,
+                        ..
+                    },
                 ..
             } => (Level::Warning, Line::Group(event)),
             GroupEvent::Fault { axis, cause } => {

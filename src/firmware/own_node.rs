@@ -25,7 +25,7 @@ use canmaster::{
     frame::MAX_DATA,
     id::Address,
     master::{MasterOd, Notice, WrongLength},
-    motion::{AxisCommand, Director, FaultCause, GroupEvent, GroupState, panel::Panel},
+    motion::{AxisCommand, Cause, Director, GroupEvent, GroupState, panel::Panel},
     network::Network,
     nmt::{Command, ErrorControl, NodeControl, State, Target},
     od::{self, Chunk, Part},
@@ -377,12 +377,12 @@ impl OwnNode {
             && let Some(node) = self.network.nodes.get(usize::from(*axis))
         {
             let node = node.id;
-            let code = match cause {
-                FaultCause::Emergency { code } => EmcyCode(*code),
+            let code = match cause.cause {
+                Cause::Emergency => EmcyCode(cause.detail as u16),
                 _ => EmcyCode::NO_ERROR,
             };
-            self.device.raise(match cause {
-                FaultCause::TpdoMissing { .. } => MasterError::PdoMissing { node, tpdo: 0 },
+            self.device.raise(match cause.cause {
+                Cause::TpdoMissing => MasterError::PdoMissing { node, tpdo: 0 },
                 _ => MasterError::AxisFault { node, code },
             });
         }

@@ -4,7 +4,7 @@
 use crate::emcy::{Class, Emcy};
 use crate::frame::Frame;
 use crate::id::NodeId;
-use crate::motion::FaultCause;
+use crate::motion::{Cause, FaultCause};
 use crate::network::Network;
 use crate::nmt::{Consumer, ErrorControl, Heard, Lost, State};
 use crate::time::{Duration, Instant};
@@ -62,11 +62,13 @@ impl Notice {
         match self {
             Notice::Emcy { emcy, .. } => match emcy.code.class() {
                 Class::Reset | Class::Warning => None,
-                Class::Fault => Some(FaultCause::Emergency { code: emcy.code.0 }),
+                Class::Fault => Some(Cause::Emergency.with(emcy.code.0 as i32)),
             },
-            Notice::HeartbeatLost(_) => Some(FaultCause::HeartbeatLost),
+            Notice::HeartbeatLost(_) => Some(Cause::HeartbeatLost.alone()),
             Notice::HeartbeatBack(_) => None,
-            Notice::BootUp(_) | Notice::NotOperational { .. } => Some(FaultCause::LeftOperational),
+            Notice::BootUp(_) | Notice::NotOperational { .. } => {
+                Some(Cause::LeftOperational.alone())
+            }
         }
     }
 
@@ -334,7 +336,7 @@ mod tests {
         assert_eq!(supervisor.poll(at(449)), None);
         let report = supervisor.poll(at(450)).unwrap();
         assert_eq!(report.axis, Some(2));
-        assert_eq!(report.notice.fault(), Some(FaultCause::HeartbeatLost));
+        assert_eq!(report.notice.fault(), Some(Cause::HeartbeatLost.alone()));
         assert_eq!(supervisor.poll(at(1000)), None);
         assert!(supervisor.any_lost());
         let frame = heartbeat(State::PreOperational);
@@ -347,7 +349,7 @@ mod tests {
         let mut supervisor = running();
         let notice = only(&mut supervisor, &heartbeat(State::Initialising), 300);
         assert_eq!(notice, Notice::BootUp(NODE));
-        assert_eq!(notice.fault(), Some(FaultCause::LeftOperational));
+        assert_eq!(notice.fault(), Some(Cause::LeftOperational.alone()));
         let frame = heartbeat(State::PreOperational);
         assert_eq!(supervisor.on_frame(&frame, at(400)), None);
     }
@@ -358,7 +360,7 @@ mod tests {
             let mut supervisor = running();
             let notice = only(&mut supervisor, &heartbeat(state), 300);
             assert_eq!(notice, Notice::NotOperational { node: NODE, state });
-            assert_eq!(notice.fault(), Some(FaultCause::LeftOperational));
+            assert_eq!(notice.fault(), Some(Cause::LeftOperational.alone()));
         }
     }
 
@@ -373,7 +375,7 @@ mod tests {
             let mut supervisor = running();
             let emcy = Emcy::new(EmcyCode(code), ErrorRegister::GENERIC);
             let notice = only(&mut supervisor, &emcy.frame(NODE), 300);
-            let expected = fault.then_some(FaultCause::Emergency { code });
+            let expected = fault.then_some(Cause::Emergency.with(code.into()));
             assert_eq!(notice.fault(), expected);
         }
     }
@@ -437,7 +439,7 @@ mod tests {
         // The others are watched as before.
         let other = ErrorControl::heartbeat(NodeId::constant::<5>(), State::PreOperational);
         let report = supervisor.on_frame(&other.frame(), at(760)).unwrap();
-        assert_eq!(report.fault(), Some(FaultCause::LeftOperational));
+        assert_eq!(report.fault(), Some(Cause::LeftOperational.alone()));
     }
 
     #[test]
@@ -446,7 +448,7 @@ mod tests {
         for ms in [300, 600] {
             supervisor.arm(ALL);
             let notice = only(&mut supervisor, &heartbeat(State::PreOperational), ms);
-            assert_eq!(notice.fault(), Some(FaultCause::LeftOperational));
+            assert_eq!(notice.fault(), Some(Cause::LeftOperational.alone()));
             supervisor.arm(ALL);
             let frame = heartbeat(State::PreOperational);
             assert_eq!(supervisor.on_frame(&frame, at(ms + 100)), None, "told once");

@@ -1,7 +1,6 @@
 //! What a group reports, with the facts for a log.
 
-use crate::cia402::{State, StatusWord, Timeout};
-use crate::motion::mode::Mode;
+use crate::cia402::{State, StatusWord};
 use crate::motion::program::Refusal;
 use crate::words::in_words;
 
@@ -74,111 +73,124 @@ in_words!(GroupState {
     GroupState::Faulted => ("faulted"),
 });
 
-/// Why the group stops and disables its axes.
+/// Why the group stops and disables its axes: the number in bits 31..16 of 200Eh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
 #[non_exhaustive]
-pub enum FaultCause {
+pub enum Cause {
     /// The drive reports a fault in its statusword.
-    DriveFault {
-        /// As received.
-        status: StatusWord,
-    },
-    /// The drive left operation enabled without being told to.
-    LeftEnabled {
-        /// As received.
-        status: StatusWord,
-    },
-    /// The drive did not follow the state machine's commands in time.
-    NotEnabled(Timeout),
+    DriveFault = 1,
+    /// The drive left operation enabled without being told to; its statusword.
+    LeftEnabled = 2,
+    /// The drive did not follow the state machine's commands in time; its
+    /// statusword.
+    NotEnabled = 3,
     /// The axis' TPDO was missing in this many cycles in a row.
-    TpdoMissing {
-        /// Consecutive cycles.
-        cycles: u8,
-    },
-    /// The axis is too far from its reference.
-    FollowingError {
-        /// Reference minus actual position, increments.
-        error: i32,
-        /// Largest magnitude allowed.
-        allowed: u32,
-    },
+    TpdoMissing = 4,
+    /// Reference minus actual position: more increments than allowed.
+    FollowingError = 5,
     /// The reference ended, but the axis did not come to rest on its target in
-    /// time.
-    NotArrived {
-        /// Target minus actual position, increments.
-        error: i32,
-    },
+    /// time: target minus actual position, increments.
+    NotArrived = 6,
     /// The drive's heartbeat stopped.
-    HeartbeatLost,
-    /// The drive sent an emergency message with a fault reaction.
-    Emergency {
-        /// Emergency error code.
-        code: u16,
-    },
+    HeartbeatLost = 7,
+    /// The drive sent an emergency message with a fault reaction; its code.
+    Emergency = 8,
     /// The drive booted again or left NMT operational.
-    LeftOperational,
+    LeftOperational = 9,
     /// The network as a whole is no longer ready.
-    NetworkLost,
+    NetworkLost = 10,
     /// The drive reports a following error or, searching for home, that it
-    /// failed: bit 13 of the statusword.
-    DriveError {
-        /// As received.
-        status: StatusWord,
-    },
+    /// failed: bit 13 of this statusword.
+    DriveError = 11,
     /// The drive did not acknowledge a set-point, or did not find its home, in
-    /// time.
-    NotDone {
-        /// In which mode.
-        mode: Mode,
-    },
+    /// time, in this mode (6060h).
+    NotDone = 12,
     /// 6061h did not show the mode of operation that was written in time.
-    ModeNotConfirmed {
-        /// The mode.
-        mode: Mode,
-    },
+    ModeNotConfirmed = 13,
     /// The planning did not keep up with the motion.
-    PathDry,
-    /// Cycles in a row did not finish in time: the drives follow old commands.
-    CyclesLate {
-        /// So many.
-        cycles: u8,
-    },
+    PathDry = 14,
+    /// So many cycles in a row did not finish in time: the drives follow old
+    /// commands.
+    CyclesLate = 15,
 }
 
-in_words!(FaultCause {
-    FaultCause::DriveFault { status } => (
+impl Cause {
+    /// With its detail.
+    pub const fn with(self, detail: i32) -> FaultCause {
+        FaultCause {
+            cause: self,
+            detail,
+        }
+    }
+
+    /// Without one.
+    pub const fn alone(self) -> FaultCause {
+        self.with(0)
+    }
+}
+
+/// A [`Cause`] with its detail. Two numbers, so that it stays in registers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FaultCause {
+    /// What happened.
+    pub cause: Cause,
+    /// A number that belongs to it; 0 if there is none.
+    pub detail: i32,
+}
+
+impl FaultCause {
+    #[cfg(feature = "defmt")]
+    const fn place(&self) -> u8 {
+        self.cause as u8 - 1
+    }
+
+    const fn status(self) -> StatusWord {
+        StatusWord(self.detail as u16)
+    }
+}
+
+in_words!(FaultCause by FaultCause::place {
+    it @ FaultCause { cause: Cause::DriveFault, detail } => (
         "the drive reports \"{}\" (statusword {:#06x}): see its emergency message",
-        status.state(), status.0
+        it.status().state(), detail
     ),
-    FaultCause::LeftEnabled { status } => (
+    it @ FaultCause { cause: Cause::LeftEnabled, detail } => (
         "the drive went to \"{}\" by itself (statusword {:#06x}): check supply, enable input and wiring",
-        status.state(), status.0
+        it.status().state(), detail
     ),
-    FaultCause::NotEnabled(timeout) => ("{}", timeout),
-    FaultCause::TpdoMissing { cycles } => (
-        "no TPDO in {} cycles in a row: check the cable and the drive's supply", cycles
+    it @ FaultCause { cause: Cause::NotEnabled, detail } => (
+        "stayed in \"{}\" (statusword {:#06x}) instead of being enabled or disabled",
+        it.status().state(), detail
     ),
-    FaultCause::FollowingError { error, allowed } => (
-        "following error of {} increments, {} allowed: check for a blocked axis, load and limits",
-        error, allowed
+    FaultCause { cause: Cause::TpdoMissing, detail } => (
+        "no TPDO in {} cycles in a row: check the cable and the drive's supply", detail
     ),
-    FaultCause::NotArrived { error } => (
-        "did not arrive: {} increments short of the target", error
+    FaultCause { cause: Cause::FollowingError, detail } => (
+        "following error of {} increments: check for a blocked axis, load and limits", detail
     ),
-    FaultCause::HeartbeatLost => ("heartbeat lost: check the cable and the drive's supply"),
-    FaultCause::Emergency { code } => ("emergency {:#06x}", code),
-    FaultCause::LeftOperational => ("the node left NMT operational"),
-    FaultCause::DriveError { status } => (
-        "the drive reports a following or homing error (statusword {:#06x})", status.0
+    FaultCause { cause: Cause::NotArrived, detail } => (
+        "did not arrive: {} increments short of the target", detail
     ),
-    FaultCause::NotDone { mode } => ("not done in time in mode \"{}\"", mode),
-    FaultCause::ModeNotConfirmed { mode } => (
-        "mode \"{}\" was not confirmed in 6061h", mode
+    FaultCause { cause: Cause::HeartbeatLost, .. } => (
+        "heartbeat lost: check the cable and the drive's supply"
     ),
-    FaultCause::PathDry => ("no set-points in time: the processor is overloaded"),
-    FaultCause::NetworkLost => ("the network is no longer complete"),
-    FaultCause::CyclesLate { cycles } => (
-        "{} cycles in a row did not finish in time: see 2F20h, take a longer cycle_us", cycles
+    FaultCause { cause: Cause::Emergency, detail } => ("emergency {:#06x}", detail),
+    FaultCause { cause: Cause::LeftOperational, .. } => ("the node left NMT operational"),
+    FaultCause { cause: Cause::NetworkLost, .. } => ("the network is no longer complete"),
+    it @ FaultCause { cause: Cause::DriveError, detail } => (
+        "the drive reports a following or homing error in \"{}\" (statusword {:#06x})",
+        it.status().state(), detail
+    ),
+    FaultCause { cause: Cause::NotDone, detail } => ("not done in time in mode {} (6060h)", detail),
+    FaultCause { cause: Cause::ModeNotConfirmed, detail } => (
+        "mode {} (6060h) was not confirmed in 6061h", detail
+    ),
+    FaultCause { cause: Cause::PathDry, .. } => (
+        "no set-points in time: the processor is overloaded"
+    ),
+    FaultCause { cause: Cause::CyclesLate, detail } => (
+        "{} cycles in a row did not finish in time: see 2F20h, take a longer cycle_us", detail
     ),
 });
 

@@ -42,7 +42,7 @@ fn greater(a: f32, b: f32) -> f32 {
 
 pub use config::{AxisConfig, GroupConfig};
 pub use director::{Director, format};
-pub use event::{FaultCause, GroupEvent, GroupState};
+pub use event::{Cause, FaultCause, GroupEvent, GroupState};
 pub use group::{
     AxisCommand, AxisFeedback, AxisView, Group, Inputs, ModeWanted, Order, SetPoint, TooLate,
 };

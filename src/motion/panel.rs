@@ -287,7 +287,7 @@ impl<const N: usize> Panel<N> {
         match *event {
             GroupEvent::Fault {
                 axis: Some(axis),
-                ref cause,
+                cause,
             } => {
                 if let Some(fault @ 0) = self.faults.get_mut(usize::from(axis)) {
                     *fault = code(cause);
@@ -363,30 +363,9 @@ impl<const N: usize> Panel<N> {
     }
 }
 
-/// What stopped the group: bits 31..16 of 200Eh the cause, counted in the order of
-/// [`FaultCause`] from 1, below it a detail.
-fn code(cause: &FaultCause) -> u32 {
-    let (number, detail) = match *cause {
-        FaultCause::DriveFault { status } => (1, status.0),
-        FaultCause::LeftEnabled { status } => (2, status.0),
-        FaultCause::NotEnabled(_) => (3, 0),
-        FaultCause::TpdoMissing { cycles } => (4, cycles.into()),
-        FaultCause::FollowingError { error, .. } => (5, short(error)),
-        FaultCause::NotArrived { error } => (6, short(error)),
-        FaultCause::HeartbeatLost => (7, 0),
-        FaultCause::Emergency { code } => (8, code),
-        FaultCause::LeftOperational => (9, 0),
-        FaultCause::NetworkLost => (10, 0),
-        FaultCause::DriveError { status } => (11, status.0),
-        FaultCause::NotDone { mode } => (12, mode as u16),
-        FaultCause::ModeNotConfirmed { mode } => (13, mode as u16),
-        FaultCause::PathDry => (14, 0),
-        FaultCause::CyclesLate { cycles } => (15, cycles.into()),
-    };
-    number << 16 | u32::from(detail)
-}
-
-/// A number of increments, as far as 16 bits hold it.
-fn short(increments: i32) -> u16 {
-    increments.unsigned_abs().min(u16::MAX.into()) as u16
+/// What stopped the group: bits 31..16 of 200Eh the [`Cause`](super::Cause), below it
+/// the magnitude of its detail, as far as 16 bits hold it.
+fn code(cause: FaultCause) -> u32 {
+    let detail = cause.detail.unsigned_abs().min(u16::MAX.into());
+    (cause.cause as u32) << 16 | detail
 }

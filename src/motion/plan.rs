@@ -12,8 +12,8 @@
 //! ramp of the same length, so that nothing else changes.
 
 use super::fixed::{self, ceil};
-use super::greater;
 use super::path::{Knot, LEG_KNOTS, Point};
+use super::{greater, next};
 use heapless::Vec;
 
 /// Longest move in cycles: times stay exact in single precision.
@@ -103,9 +103,9 @@ impl Leg {
     };
 }
 
-/// Phases in cycles: all of it, speeding up, braking; what is left over is at
-/// constant velocity. Each ramp is led in and out in `jerk` cycles.
-#[derive(Clone, Copy, Debug)]
+/// Phases in cycles, as they are searched for: all of it, speeding up, braking; what is
+/// left over is at constant velocity. Each ramp is led in and out in `jerk` cycles.
+#[derive(Clone, Copy, Debug, Default)]
 struct Phases {
     total: u32,
     up: u32,
@@ -205,66 +205,69 @@ impl Leg {
     }
 }
 
-/// Phases of `total` cycles that keep the limits of all legs of `set`.
-#[inline(never)]
-fn fit(legs: &[Leg], set: Option<u8>, total: u32, jerk: u32) -> Option<Phases> {
-    let shortest = (2 * jerk).max(1);
-    let (mut up, mut down) = (shortest, shortest);
-    for _ in 0..ROUNDS {
-        if up + down > total {
-            return None;
-        }
-        let weight = (2 * total - up - down) as f32;
-        let (so_far_up, so_far_down) = (up, down);
-        for leg in legs {
-            if leg.set != set {
-                continue;
+impl Phases {
+    /// Whether there are phases of `total` cycles that keep the limits of the legs of
+    /// `set` (bit n for leg n): then these are they.
+    #[inline(never)]
+    fn fit(&mut self, legs: &[Leg], set: u32, total: u32) -> bool {
+        let shortest = (2 * self.jerk).max(1);
+        self.total = total;
+        (self.up, self.down) = (shortest, shortest);
+        for _ in 0..ROUNDS {
+            let (up, down) = (self.up, self.down);
+            if up + down > total {
+                return false;
             }
-            let from = leg.work.speed;
-            let cruise = (2.0 * leg.work.way - from * so_far_up as f32) / weight;
-            if cruise.abs() > leg.velocity * ROUNDING {
+            let weight = (2 * total - up - down) as f32;
+            let mut left = set;
+            while let Some(n) = next(&mut left) {
+                let Some(leg) = legs.get(n) else { break };
+                let from = leg.work.speed;
+                let cruise = (2.0 * leg.work.way - from * up as f32) / weight;
+                if cruise.abs() > leg.velocity * ROUNDING {
+                    return false;
+                }
+                let mut slope = leg.acceleration;
+                let turns = cruise * from < 0.0 && slope > leg.deceleration;
+                if turns || (cruise * from >= 0.0 && cruise.abs() < from.abs()) {
+                    slope = leg.deceleration;
+                }
+                self.up = self.up.max(self.ramp(cruise - from, slope));
+                self.down = self.down.max(self.ramp(cruise, leg.deceleration));
+            }
+            if (up, down) == (self.up, self.down) {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Cycles of a change of speed.
+    #[inline(never)]
+    fn ramp(&self, speed: f32, slope: f32) -> u32 {
+        ceil(speed.abs() / (slope * ROUNDING)) + self.jerk
+    }
+
+    /// The shortest phases of at least `at_least` cycles.
+    fn shortest(&mut self, legs: &[Leg], set: u32, at_least: u32) -> Option<u32> {
+        let (mut low, mut high) = (at_least, at_least);
+        while !self.fit(legs, set, high) {
+            low = high + 1;
+            high = 2 * low;
+            if low > CYCLES_MAX {
                 return None;
             }
-            let mut slope = leg.acceleration;
-            let turns = cruise * from < 0.0 && slope > leg.deceleration;
-            if turns || (cruise * from >= 0.0 && cruise.abs() < from.abs()) {
-                slope = leg.deceleration;
+        }
+        while low < high {
+            let middle = low.midpoint(high);
+            if self.fit(legs, set, middle) {
+                high = middle;
+            } else {
+                low = middle + 1;
             }
-            let cycles = |speed: f32, slope: f32| ceil(speed.abs() / (slope * ROUNDING)) + jerk;
-            up = up.max(cycles(cruise - from, slope));
-            down = down.max(cycles(cruise, leg.deceleration));
         }
-        if (up, down) == (so_far_up, so_far_down) {
-            return Some(Phases {
-                total,
-                up,
-                down,
-                jerk,
-            });
-        }
+        Some(high)
     }
-    None
-}
-
-/// The shortest phases for `set` of at least `at_least` cycles.
-fn shortest(legs: &[Leg], set: Option<u8>, at_least: u32, jerk: u32) -> Option<u32> {
-    let (mut low, mut high) = (at_least, at_least);
-    while fit(legs, set, high, jerk).is_none() {
-        low = high + 1;
-        high = 2 * low;
-        if low > CYCLES_MAX {
-            return None;
-        }
-    }
-    while low < high {
-        let middle = low.midpoint(high);
-        if fit(legs, set, middle, jerk).is_some() {
-            high = middle;
-        } else {
-            low = middle + 1;
-        }
-    }
-    Some(high)
 }
 
 /// Plans the legs: their knots and what goes with them.
@@ -273,11 +276,18 @@ fn shortest(legs: &[Leg], set: Option<u8>, at_least: u32, jerk: u32) -> Option<u
 /// The first leg, counted from 0, of a set that takes longer than [`CYCLES_MAX`]
 /// cycles.
 pub fn plan(legs: &mut [Leg]) -> Result<(), u8> {
+    let mut done = 0;
     for first in 0..legs.len() {
-        let (before, left) = legs.split_at(first);
-        let set = left.first().and_then(|leg| leg.set);
-        let done = before.iter().any(|leg| leg.set == set);
-        if set.is_some() && !done && plan_set(legs, set).is_none() {
+        let set = legs.get(first).and_then(|leg| leg.set);
+        if set.is_none() || done >> first & 1 != 0 {
+            continue;
+        }
+        let mut members = 0;
+        for leg in legs.iter().rev() {
+            members = members << 1 | u32::from(leg.set == set);
+        }
+        done |= members;
+        if plan_set(legs, members).is_none() {
             return Err(first as u8);
         }
     }
@@ -285,39 +295,40 @@ pub fn plan(legs: &mut [Leg]) -> Result<(), u8> {
 }
 
 #[inline(never)]
-fn plan_set(legs: &mut [Leg], set: Option<u8>) -> Option<()> {
-    let (mut jerk, mut moving) = (0, false);
-    for leg in legs.iter_mut() {
-        if leg.set == set {
-            leg.begin();
-            moving |= leg.from.velocity != 0;
-            if leg.jerk > 0.0 {
-                let most = greater(leg.acceleration, leg.deceleration);
-                jerk = jerk.max(ceil(most / leg.jerk));
-            }
+fn plan_set(legs: &mut [Leg], set: u32) -> Option<()> {
+    let mut phases = Phases::default();
+    let mut moving = false;
+    let mut left = set;
+    while let Some(n) = next(&mut left) {
+        let leg = legs.get_mut(n)?;
+        leg.begin();
+        moving |= leg.from.velocity != 0;
+        if leg.jerk > 0.0 {
+            let most = greater(leg.acceleration, leg.deceleration);
+            phases.jerk = phases.jerk.max(ceil(most / leg.jerk));
         }
     }
     // In motion each has its own phases, and only the end is common.
-    let group = |legs: &[Leg], n: usize| if moving { n..n + 1 } else { 0..legs.len() };
+    let group = |n: usize| if moving { 1 << n } else { set };
     let (mut total, mut before) = (1u32, 0);
     while total != before {
         before = total;
-        for n in 0..legs.len() {
-            let leg = legs.get(n)?;
-            if leg.set == set {
-                let left = total.saturating_sub(leg.work.lead).max(1);
-                let own = shortest(legs.get(group(legs, n))?, set, left, jerk)?;
-                // None has to wait longer for another at the end.
-                total = total.max(own + leg.work.lead);
-            }
+        left = set;
+        while let Some(n) = next(&mut left) {
+            let lead = legs.get(n)?.work.lead;
+            let at_least = total.saturating_sub(lead).max(1);
+            let own = phases.shortest(legs, group(n), at_least)?;
+            // None has to wait longer for another at the end.
+            total = total.max(own + lead);
         }
     }
-    for n in 0..legs.len() {
-        let leg = legs.get(n)?;
-        if leg.set == set {
-            let phases = fit(legs.get(group(legs, n))?, set, total - leg.work.lead, jerk)?;
-            legs.get_mut(n)?.lay(&phases);
+    left = set;
+    while let Some(n) = next(&mut left) {
+        let own = total - legs.get(n)?.work.lead;
+        if !phases.fit(legs, group(n), own) {
+            return None;
         }
+        legs.get_mut(n)?.lay(&phases);
     }
     Some(())
 }

@@ -161,6 +161,7 @@ impl PositionControl {
 /// The number of `low ..= high` that is nearest to `x`. Unlike `f32::clamp` it
 /// has no panic, whose message would bring the formatting of floating-point
 /// numbers into the image.
+#[inline(never)]
 fn within(x: f32, low: f32, high: f32) -> f32 {
     if x < low {
         low

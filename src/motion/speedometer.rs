@@ -1,56 +1,61 @@
 //! Velocity from positions, for a drive whose TPDOs carry none.
 
 use super::scale::Scale;
-use crate::time::Duration;
 
 /// The mean velocity of the last cycles, the newest counting most.
 ///
 /// An increment in one cycle of 2 ms is 15 rpm with 2000 increments for a turn: too
 /// coarse to tell rest from motion. Averaged over 20 ms it is 1.5 rpm.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Speedometer {
     last: Option<i32>,
     /// Increments of the last cycles, older ones fading.
     moved: f32,
-    /// The part of them that fades in a cycle.
-    fading: f32,
-    /// rpm for an increment.
-    rpm: f32,
 }
 
-/// Over how long it averages.
-const MEMORY: Duration = Duration::from_millis(20);
-
 impl Speedometer {
-    /// For an encoder of `increments_per_turn` and a position each `cycle`.
-    pub const fn new(increments_per_turn: u32, cycle: Duration) -> Speedometer {
-        let cycles = cycle.as_micros() as f32 / MEMORY.as_micros() as f32;
-        let fading = if cycles > 1.0 { 1.0 } else { cycles };
+    /// Before the first position.
+    pub const fn new() -> Speedometer {
         Speedometer {
             last: None,
             moved: 0.0,
-            fading,
-            rpm: fading * Scale::new(increments_per_turn, cycle).rpm_per_increment(),
         }
     }
 
-    /// The velocity in rpm at a new position.
-    pub fn at(&mut self, position: i32) -> i32 {
+    /// The velocity in rpm at the new position of an axis of this `scale`.
+    pub fn at(&mut self, position: i32, scale: &Scale) -> i32 {
+        /// Over how long it averages: 20 ms.
+        const PER_SECOND: f32 = 50.0;
         let way = position.wrapping_sub(self.last.unwrap_or(position));
         self.last = Some(position);
         self.moved += way as f32;
-        let rpm = (self.moved * self.rpm) as i32;
-        self.moved -= self.moved * self.fading;
-        rpm
+        // The part that fades in a cycle.
+        let mut fading = scale.per_cycle(PER_SECOND);
+        if fading > 1.0 {
+            fading = 1.0;
+        }
+        let faded = self.moved * fading;
+        self.moved -= faded;
+        scale.rpm(faded) as i32
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::time::Duration;
 
-    fn speedometer(cycle_ms: u32) -> Speedometer {
-        Speedometer::new(2000, Duration::from_millis(cycle_ms))
+    struct Speed(Speedometer, Scale);
+
+    impl Speed {
+        fn at(&mut self, position: i32) -> i32 {
+            self.0.at(position, &self.1)
+        }
+    }
+
+    fn speedometer(cycle_ms: u32) -> Speed {
+        let scale = Scale::new(2000, Duration::from_millis(cycle_ms));
+        Speed(Speedometer::new(), scale)
     }
 
     #[test]

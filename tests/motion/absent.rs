@@ -1,7 +1,7 @@
 //! Axes whose optional nodes are not there.
 
 use canmaster::cia402::{Command, ControlWord};
-use canmaster::motion::{FaultCause, GroupEvent, GroupState, Inputs, Order};
+use canmaster::motion::{Cause, GroupEvent, GroupState, Inputs, Order};
 
 use crate::rig::{AXES, READY, Rig, far};
 
@@ -62,7 +62,7 @@ fn one_that_goes_in_motion_stops_all_and_is_left_out_then() {
     let mut rig = Rig::moving(2, 100);
     rig.step(WITHOUT);
     assert_eq!(rig.group.state(), GroupState::FaultStop);
-    let cause = FaultCause::LeftOperational;
+    let cause = Cause::LeftOperational.alone();
     let axis = Some(AXIS as u8);
     assert!(rig.events.contains(&GroupEvent::Fault { axis, cause }));
     rig.silent[AXIS] = true;
@@ -112,7 +112,7 @@ fn one_that_comes_waits_for_standby_and_is_enabled_with_the_others() {
 fn a_fault_of_another_axis_is_not_forgiven_by_it() {
     let mut rig = Rig::moving(3, 100);
     rig.step(Inputs {
-        fault: Some((AXIS + 1, FaultCause::HeartbeatLost)),
+        fault: Some((AXIS + 1, Cause::HeartbeatLost.alone())),
         ..READY
     });
     run(&mut rig, READY, GroupState::Faulted, 300);

@@ -1,10 +1,10 @@
 //! The contract's sentences, each against drives.
 
-use canmaster::cia402::{Command, ControlWord, State};
+use canmaster::cia402::{Command, ControlWord, State, StatusWord};
 use canmaster::motion::experiment::{Motor, group};
 use canmaster::motion::mode::Mode;
+use canmaster::motion::{Cause, GroupEvent, GroupState, Reason, Refusal};
 use canmaster::motion::{Director, Group, GroupConfig, Inputs, Order};
-use canmaster::motion::{FaultCause, GroupEvent, GroupState, Reason, Refusal};
 use canmaster::time::Duration;
 
 use crate::rig::{ALL, AXES, READY, Rig, far};
@@ -176,7 +176,7 @@ fn a_fault_stops_all_axes_together() {
                 now
             }
         });
-        let lost = FaultCause::HeartbeatLost;
+        let lost = Cause::HeartbeatLost.alone();
         rig.step(Inputs {
             fault: Some((AXIS, lost)),
             ..READY
@@ -395,8 +395,9 @@ fn a_drive_that_does_not_follow_is_named() {
         rig.drives[AXIS].stuck = Some(state);
         rig.until(FaultStop, 300);
         let named = rig.events.iter().any(|e| {
-            matches!(e, GroupEvent::Fault { axis: Some(3), cause: FaultCause::NotEnabled(timeout) }
-                if timeout.state == Some(state))
+            matches!(e, GroupEvent::Fault { axis: Some(3), cause }
+                if cause.cause == Cause::NotEnabled
+                    && StatusWord(cause.detail as u16).state() == state)
         });
         assert!(named, "{state}: {}", rig.last());
         rig.until(Faulted, 400);
@@ -429,7 +430,7 @@ fn a_path_that_runs_dry_is_a_fault() {
         },
     );
     rig.until(FaultStop, 60);
-    let cause = FaultCause::PathDry;
+    let cause = Cause::PathDry.alone();
     assert!(rig.events.contains(&GroupEvent::Fault {
         axis: Some(0),
         cause

@@ -5,7 +5,7 @@ use canmaster::cia402::State;
 use canmaster::motion::experiment::GROUP;
 use canmaster::motion::mode::Mode;
 use canmaster::motion::{AxisCommand, Group, Inputs, Order};
-use canmaster::motion::{AxisFeedback, FaultCause, GroupEvent, GroupState};
+use canmaster::motion::{AxisFeedback, Cause, GroupEvent, GroupState};
 use proptest::prelude::*;
 
 use crate::plant::Random;
@@ -44,7 +44,7 @@ fn a_fault_at_any_moment_ends_at_rest() {
             0 => rig.drives[axis].fail(),
             1 => rig.drives[axis].state = State::SwitchOnDisabled,
             2 => rig.silent[axis] = true,
-            3 => inputs.fault = Some((axis, FaultCause::Emergency { code: 0x2310 })),
+            3 => inputs.fault = Some((axis, Cause::Emergency.with(0x2310))),
             4 => inputs.network_ready = false,
             _ => rig.drives[axis].position += 3000.0,
         }
@@ -150,7 +150,7 @@ proptest! {
         let mut group = Group::new(&GROUP);
         let mut out = [AxisCommand::default(); AXES];
         for (feedback, network_ready, order, fault, absent) in steps {
-            let fault = (fault == 0).then_some((2, FaultCause::HeartbeatLost));
+            let fault = (fault == 0).then_some((2, Cause::HeartbeatLost.alone()));
             if let Some(order) = order {
                 let _ = group.order(order);
             }
@@ -218,7 +218,7 @@ fn references_go_on_in_missed_cycles() {
 #[test]
 fn cycles_that_are_late_stop_the_group() {
     let mut rig = Rig::moving(7, 100);
-    let cause = FaultCause::CyclesLate { cycles: 3 };
+    let cause = Cause::CyclesLate.with(3);
     rig.step(Inputs {
         fault: Some((usize::MAX, cause)),
         ..READY

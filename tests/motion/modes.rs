@@ -1,8 +1,8 @@
 //! Changes of mode, profile position, homing, torque.
 
-use canmaster::cia402::ControlWord;
+use canmaster::cia402::{ControlWord, StatusWord};
 use canmaster::motion::mode::Mode;
-use canmaster::motion::{AxisMove, FaultCause, GroupEvent, GroupState};
+use canmaster::motion::{AxisMove, Cause, GroupEvent, GroupState};
 use canmaster::motion::{Order, SetPoint};
 
 use crate::rig::{ALL, AXES, READY, Rig, far};
@@ -71,7 +71,7 @@ fn a_mode_that_is_not_confirmed_is_a_fault_that_names_it() {
     let mode = Mode::CyclicTorque;
     rig.order(Order::SetMode { axes: 0b100, mode });
     rig.until(FaultStop, 300);
-    let cause = FaultCause::ModeNotConfirmed { mode };
+    let cause = Cause::ModeNotConfirmed.with(mode as i32);
     assert!(rig.events.contains(&GroupEvent::Fault {
         axis: Some(2),
         cause
@@ -159,7 +159,7 @@ fn a_deaf_drive_is_named_in_time() {
     rig.go(far);
     rig.until(FaultStop, 300);
     let mode = Mode::ProfilePosition;
-    let cause = FaultCause::NotDone { mode };
+    let cause = Cause::NotDone.with(mode as i32);
     assert!(rig.events.contains(&GroupEvent::Fault {
         axis: Some(4),
         cause
@@ -205,9 +205,9 @@ fn homing_that_fails_or_takes_too_long_is_a_fault() {
             GroupEvent::Fault {
                 axis: Some(1),
                 cause,
-            } => match cause {
-                FaultCause::DriveError { status } => homeless && status.mode_bit_13(),
-                FaultCause::NotDone { mode } => !homeless && *mode == Mode::Homing,
+            } => match cause.cause {
+                Cause::DriveError => homeless && StatusWord(cause.detail as u16).mode_bit_13(),
+                Cause::NotDone => !homeless && cause.detail == Mode::Homing as i32,
                 _ => false,
             },
             _ => false,

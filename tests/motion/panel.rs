@@ -3,7 +3,7 @@
 use canmaster::id::Address;
 use canmaster::motion::experiment::GROUP;
 use canmaster::motion::panel::{self, PROGRAM_BYTES, Panel};
-use canmaster::motion::{FaultCause, GroupEvent, GroupState, Inputs};
+use canmaster::motion::{Cause, GroupEvent, GroupState, Inputs};
 use canmaster::od::Part;
 use canmaster::sdo::AbortCode;
 
@@ -221,7 +221,7 @@ fn the_first_fault_of_an_axis_is_kept_until_it_is_enabled_again() {
     let mut desk = Desk::new();
     let fault = |code| GroupEvent::Fault {
         axis: Some(2),
-        cause: FaultCause::Emergency { code },
+        cause: Cause::Emergency.with(code),
     };
     desk.panel.on_event(&fault(0x7121));
     desk.panel.on_event(&fault(0x8611));

@@ -372,10 +372,7 @@ fn a_frame_that_is_wrong_is_named() {
         assert_eq!(with(at, byte ^ 0x10).0, Reason::Checksum, "{at}");
     }
     let error = format::check(&bytes[..8], &GROUP).unwrap_err();
-    assert_eq!(
-        error.to_string(),
-        "length in bytes is 8, allowed is 18"
-    );
+    assert_eq!(error.to_string(), "length in bytes is 8, allowed is 18");
 }
 
 #[test]

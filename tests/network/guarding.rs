@@ -77,7 +77,6 @@ fn the_retries_are_asked_before_it_is_lost_once() {
     let lost = Lost {
         node: NODE,
         last: State::Operational,
-        heard: ms(1),
     };
     assert_eq!(g.poll(ms(400)), Some(Guard::Lost(lost)));
     assert!(g.is_lost());

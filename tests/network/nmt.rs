@@ -234,7 +234,6 @@ fn the_consumer_reports_a_loss_once_and_a_return() {
     let lost = Lost {
         node: NODE,
         last: State::Operational,
-        heard: ms(0),
     };
     assert_eq!(consumer.poll(ms(100)), Some(lost));
     assert_eq!(consumer.poll(ms(101)), None);

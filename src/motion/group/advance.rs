@@ -6,9 +6,7 @@ use super::axis::{
 use super::{Group, ModeWanted, bit};
 use crate::cia402::Goal;
 use crate::motion::contract::{Cell, Event, cell};
-use crate::motion::{
-    AxisConfig, FaultCause, GroupConfig, GroupEvent, GroupState, fixed, greater, next,
-};
+use crate::motion::{AxisConfig, Cause, GroupConfig, GroupEvent, GroupState, fixed, greater, next};
 
 impl<const N: usize> Group<N> {
     /// What an event does, as the table has it. `false`: it is refused.
@@ -64,20 +62,22 @@ impl<const N: usize> Group<N> {
     /// Ramps from the next SYNC on, equally long for all axes.
     fn stop(&mut self, fault: bool) {
         let Some(config) = self.config else { return };
-        let mut speeds = [0.0; N];
+        let led = self.here() & !self.excluded;
         let mut fastest = 0.0;
-        let axes = self.axes.iter().zip(&config.axes).zip(&mut speeds);
-        for (n, ((axis, config), speed)) in axes.enumerate() {
-            if self.here() & !self.excluded & bit(n) != 0 {
-                *speed = axis.speed(fault, config);
-                fastest = greater(fastest, speed.abs());
+        for (n, (axis, config)) in self.axes.iter().zip(&config.axes).enumerate() {
+            if led & bit(n) != 0 {
+                fastest = greater(fastest, axis.speed(fault, config).abs());
             }
         }
         let cycles = stop_cycles(fastest, config).max(1);
-        for (n, speed) in speeds.into_iter().enumerate() {
-            let (Some(axis), Some(config)) = (self.axes.get_mut(n), config.axes.get(n)) else {
-                continue;
+        for (n, config) in config.axes.iter().enumerate() {
+            let Some(axis) = self.axes.get_mut(n) else {
+                break;
             };
+            let mut speed = 0.0;
+            if led & bit(n) != 0 {
+                speed = axis.speed(fault, config);
+            }
             let slope = axis.stop(cycles, speed, config);
             if axis.seen & BY_POSITION != 0 {
                 self.set_ramps(n, slope, slope);
@@ -114,7 +114,7 @@ impl<const N: usize> Group<N> {
                 None => true,
                 Some(ModeWanted { axis, mode }) => {
                     if self.since > config.cycles(config.enable_timeout) {
-                        let cause = FaultCause::ModeNotConfirmed { mode };
+                        let cause = Cause::ModeNotConfirmed.with(mode as i32);
                         self.fault(Some(axis as u8), cause, Event::Late);
                     }
                     false
@@ -166,24 +166,23 @@ impl<const N: usize> Group<N> {
             };
             let near = on_target && axis.seen & BY_POSITION != 0;
             let rest = if near { PLACED } else { AT_REST };
-            let outcome = if on_target && axis.seen & BY_DRIVE != 0 {
+            let (done, late, cause);
+            if on_target && axis.seen & BY_DRIVE != 0 {
                 let limit = config.cycles(config.enable_timeout);
-                axis.led.outcome(axis.mode(), limit)
-            } else if axis.seen & rest != 0 {
-                Ok(true)
-            } else if axis.waited() > config.cycles(config.settle_timeout) {
-                let error = axis.error();
-                Err(FaultCause::NotArrived { error })
+                done = axis.led.is_done();
+                late = axis.led.is_late(axis.mode(), limit);
+                cause = Cause::NotDone.with(axis.mode() as i32);
             } else {
-                Ok(false)
-            };
-            match outcome {
-                Ok(false) => continue,
-                Err(cause) => {
+                done = axis.seen & rest != 0;
+                late = axis.waited() > config.cycles(config.settle_timeout);
+                cause = Cause::NotArrived.with(axis.error());
+            }
+            if !done {
+                if late {
                     self.fault(Some(n as u8), cause, Event::Late);
                     return false;
                 }
-                Ok(true) => {}
+                continue;
             }
             waiting &= !bit(n);
             self.busy &= !bit(n);

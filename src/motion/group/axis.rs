@@ -301,6 +301,7 @@ impl Axis {
 
     /// Speed from which a stop begins, rpm: of the reference, after a fault of
     /// what was last commanded; of a torque, of the motor.
+    #[inline(never)]
     pub(super) fn speed(&self, fault: bool, config: &AxisConfig) -> f32 {
         match self.mode() {
             mode if mode.is_led_by_drive() => 0.0,

@@ -2,7 +2,6 @@
 //! position mode (CiA 402-2, 10.3) and homing (11.3).
 
 use crate::cia402::{ControlWord, StatusWord};
-use crate::motion::FaultCause;
 use crate::motion::mode::Mode;
 
 /// Bit 4 of the controlword: new set-point, or begin homing.
@@ -128,19 +127,20 @@ impl DriveLed {
         true
     }
 
-    /// Whether it is done; an error if a handshake takes more than `limit` cycles,
-    /// or homing longer than it may.
-    pub(super) fn outcome(&self, mode: Mode, limit: u32) -> Result<bool, FaultCause> {
+    /// Whether it is done.
+    pub(super) fn is_done(&self) -> bool {
+        self.phase == Phase::Done
+    }
+
+    /// Whether a handshake takes more than `limit` cycles, or homing longer than it
+    /// may.
+    pub(super) fn is_late(&self, mode: Mode, limit: u32) -> bool {
         let limit = match (mode, self.phase) {
-            (_, Phase::Done) => return Ok(true),
             (Mode::Homing, _) => self.limit,
             // The drive moves as long as it needs.
             (_, Phase::Running) => u32::MAX,
             _ => limit,
         };
-        if self.waited > limit {
-            return Err(FaultCause::NotDone { mode });
-        }
-        Ok(false)
+        self.waited > limit
     }
 }

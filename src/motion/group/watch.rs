@@ -2,10 +2,10 @@
 
 use super::axis::{BY_DRIVE, BY_POSITION, ENABLED, FAILED, FRESH, HEARD, REACHED, SILENT, SOUND};
 use super::{Group, Inputs, bit};
-use crate::cia402::{Goal, StatusWord, Timeout};
+use crate::cia402::{Goal, StatusWord};
 use crate::motion::contract::Event;
 use crate::motion::mode::Mode;
-use crate::motion::{FaultCause, GroupConfig, GroupEvent, GroupState, next};
+use crate::motion::{Cause, FaultCause, GroupConfig, GroupEvent, GroupState, next};
 
 impl<const N: usize> Group<N> {
     /// Looks for faults in what was told and reported in this step.
@@ -18,7 +18,7 @@ impl<const N: usize> Group<N> {
             GroupState::Idle | GroupState::Faulted => return,
             GroupState::FaultStop => {}
             _ if !inputs.network_ready => {
-                self.fault(None, FaultCause::NetworkLost, Event::NotReady);
+                self.fault(None, Cause::NetworkLost.alone(), Event::NotReady);
             }
             _ => {}
         }
@@ -53,6 +53,7 @@ impl<const N: usize> Group<N> {
     ) -> Option<FaultCause> {
         let (axis, limits) = (self.axes.get_mut(n)?, config.axes.get(n)?);
         let status = StatusWord(axis.feedback.statusword);
+        let shown = i32::from(status.0);
         let faulted = self.faulted & bit(n) != 0;
         let mode = axis.mode();
         let (seen, by_drive) = (axis.seen, axis.seen & BY_DRIVE != 0);
@@ -60,19 +61,17 @@ impl<const N: usize> Group<N> {
             && matches!(state, GroupState::Moving | GroupState::Homing)
             && !axis.led.hear(mode, axis.fresh_status(), inputs.cycles())
         {
-            return Some(FaultCause::DriveError { status });
+            return Some(Cause::DriveError.with(shown));
         }
         if !faulted && inputs.network_ready && inputs.absent & bit(n) != 0 {
-            return Some(FaultCause::LeftOperational);
+            return Some(Cause::LeftOperational.alone());
         }
         if !faulted && seen & SILENT != 0 {
-            let cycles = axis.missing;
-            return Some(FaultCause::TpdoMissing { cycles });
+            return Some(Cause::TpdoMissing.with(axis.missing.into()));
         }
         let leads = matches!(state, GroupState::Enabling | GroupState::Disabling);
         if late && seen & REACHED == 0 {
-            let (state, goal) = (axis.machine.state(), self.stage);
-            return Some(FaultCause::NotEnabled(Timeout { state, goal }));
+            return Some(Cause::NotEnabled.with(shown));
         }
         let stops = state == GroupState::FaultStop;
         if seen & FRESH == 0 || (stops && self.excluded & bit(n) != 0) {
@@ -81,26 +80,26 @@ impl<const N: usize> Group<N> {
         if seen & FAILED != 0 {
             // The first stage of enabling resets the faults of the past.
             let reset = leads && self.stage == Goal::Disabled;
-            return (!reset).then_some(FaultCause::DriveFault { status });
+            return (!reset).then_some(Cause::DriveFault.with(shown));
         }
         if leads || state == GroupState::QuickStop {
             return None;
         }
         if !(seen & ENABLED != 0 || (stops && by_drive)) {
-            return Some(FaultCause::LeftEnabled { status });
+            return Some(Cause::LeftEnabled.with(shown));
         }
         if self.state == GroupState::FaultStop || axis.wanted.is_some() {
             return None;
         }
         let reports = matches!(mode, Mode::CyclicPosition | Mode::ProfilePosition);
         if reports && status.mode_bit_13() {
-            return Some(FaultCause::DriveError { status });
+            return Some(Cause::DriveError.with(shown));
         }
         let (allowed, error) = (limits.following_error_max, axis.error());
         if seen & BY_POSITION != 0 && error.unsigned_abs() > allowed {
-            return Some(FaultCause::FollowingError { error, allowed });
+            return Some(Cause::FollowingError.with(error));
         }
-        axis.path.is_dry().then_some(FaultCause::PathDry)
+        axis.path.is_dry().then_some(Cause::PathDry.alone())
     }
 
     /// Reports a fault and, if the group is not stopped for one yet, stops it.
