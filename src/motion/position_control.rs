@@ -54,17 +54,25 @@ impl Tuning {
     };
 
     /// For the same drives at another cycle: the gain falls with the delay of the
-    /// loop, 1.5 cycles and the lag.
+    /// loop, 1.5 cycles and the lag; the lag is learned in the same time.
     pub const fn for_cycle(cycle: Duration) -> Tuning {
         /// The product of gain and delay, per mille.
         const GAIN_BY_DELAY: f32 = 300.0;
         /// The lag that a drive is taken to have, in milliseconds.
         const LAG_MS: f32 = 10.0;
         const CYCLES: f32 = 1.5;
+        /// Share of a newly seen lag that is taken over in a millisecond.
+        const LEARNED_IN_MS: f32 = 0.003;
+        /// Longer cycles learn no faster.
+        const CYCLE_MS_MAX: f32 = 10.0;
+        const fn least(a: f32, b: f32) -> f32 {
+            if a < b { a } else { b }
+        }
         const US_PER_MS: f32 = 1000.0;
         let cycle_ms = cycle.as_micros() as f32 / US_PER_MS;
         Tuning {
             gain: GAIN_BY_DELAY / (CYCLES * cycle_ms + LAG_MS),
+            learning: LEARNED_IN_MS * least(cycle_ms, CYCLE_MS_MAX),
             ..Tuning::MILLISECONDS_10
         }
     }
