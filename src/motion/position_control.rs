@@ -61,10 +61,8 @@ impl Tuning {
         /// The lag that a drive is taken to have, in milliseconds.
         const LAG_MS: f32 = 10.0;
         const CYCLES: f32 = 1.5;
-        /// Share of a newly seen lag that is taken over in a millisecond.
-        const LEARNED_IN_MS: f32 = 0.003;
         /// Longer cycles learn no faster.
-        const CYCLE_MS_MAX: f32 = 10.0;
+        const NOMINAL_MS: f32 = 10.0;
         const fn least(a: f32, b: f32) -> f32 {
             if a < b { a } else { b }
         }
@@ -72,7 +70,7 @@ impl Tuning {
         let cycle_ms = cycle.as_micros() as f32 / US_PER_MS;
         Tuning {
             gain: GAIN_BY_DELAY / (CYCLES * cycle_ms + LAG_MS),
-            learning: LEARNED_IN_MS * least(cycle_ms, CYCLE_MS_MAX),
+            learning: Tuning::MILLISECONDS_10.learning * least(cycle_ms / NOMINAL_MS, 1.0),
             ..Tuning::MILLISECONDS_10
         }
     }
