@@ -1,5 +1,6 @@
 //! The board: core, memories and peripherals run together.
 
+mod context;
 mod pause;
 mod reset;
 mod routing;
@@ -41,8 +42,6 @@ const HARD_FAULT: u32 = 3;
 const EXCEPTION_MASK: u32 = 0x1FF;
 /// Bits of xPSR that hold the state of an IF-THEN block.
 const IF_THEN_MASK: u32 = 0x0600_FC00;
-/// The link register holds at least this in a handler that was just entered.
-const EXC_RETURN: u32 = 0xFFFF_FFE0;
 
 /// The emulated board.
 #[derive(Debug)]
@@ -75,6 +74,8 @@ pub struct Board {
     exception: u32,
     /// The IF-THEN bits of xPSR after the last step.
     if_then: u32,
+    /// FPSCR after the last step of a context that uses the FPU.
+    fpscr: u32,
     basepri: u8,
     sync_priority: u8,
     pub(super) stats_from: u64,
@@ -143,6 +144,7 @@ impl Board {
             measure: Measure::default(),
             exception: 0,
             if_then: 0,
+            fpscr: 0,
             basepri: 0,
             sync_priority: 0,
             stats_from: 0,
@@ -211,6 +213,7 @@ impl Board {
         let regs = self.core.regs();
         let pc = regs.r[15];
         let exception = regs.xpsr & EXCEPTION_MASK;
+        self.keep_fpscr(used, &regs);
         if exception != self.exception {
             if self.if_then != 0 {
                 self.keep_if_then(&regs);
@@ -252,28 +255,6 @@ impl Board {
             return self.fault(&regs, exception);
         }
         None
-    }
-
-    /// An exception was taken within an IF-THEN block: its state belongs into
-    /// the stacked xPSR (DDI 0403, B1.5.6), where the emulator writes zeros, so
-    /// that the rest of the block would run unconditionally after the return.
-    #[cold]
-    fn keep_if_then(&mut self, regs: &Regs) {
-        /// Places in the exception frame.
-        const RETURN_ADDRESS: u32 = 24;
-        const XPSR: u32 = 28;
-        let frame = regs.r[13];
-        let Some(xpsr) = self.memory.word(frame.wrapping_add(XPSR)) else {
-            return;
-        };
-        // A return from an exception, within such a block, stacks nothing.
-        let entered = self.memory.word(frame.wrapping_add(RETURN_ADDRESS)) == Some(self.pc)
-            && xpsr & EXCEPTION_MASK == self.exception
-            && regs.r[14] >= EXC_RETURN;
-        if entered && xpsr & IF_THEN_MASK == 0 {
-            self.memory
-                .poke(frame.wrapping_add(XPSR), xpsr | self.if_then);
-        }
     }
 
     /// The program counter did not move in a step of one cycle: the core

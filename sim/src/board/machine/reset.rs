@@ -43,6 +43,7 @@ impl Board {
         self.in_fault = false;
         self.exception = 0;
         self.if_then = 0;
+        self.fpscr = 0;
         self.basepri = 0;
         self.pc = 0;
     }

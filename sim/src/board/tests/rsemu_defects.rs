@@ -73,3 +73,41 @@ fn an_interrupt_within_an_if_then_block_does_not_end_it() {
     assert!(board.stats().irq(28).expect("was taken").count > 1000);
     assert_eq!(board.word(SRAM), Some(0), "r2 is never 1");
 }
+
+/// What a comparison of the FPU has found outlives an interrupt whose handler does
+/// not use it (DDI 0403, B1.5.7). The emulator clears FPSCR at the entry;
+/// `Board::step` puts it back.
+#[test]
+fn an_interrupt_after_a_comparison_does_not_change_what_it_found() {
+    use super::{Program, SRAM, TIM_SR, TIM2, TIM2_EXCEPTION, load, store};
+    use crate::time::Time;
+    const CPACR: u32 = 0xE000_ED88;
+    const FULL_ACCESS: u32 = 0xF << 20;
+    const MOVS_R3_0: u16 = 0x2300;
+    const VMOV_S0_1: [u16; 2] = [0xEEB7, 0x0A00];
+    const VMOV_S1_HALF: [u16; 2] = [0xEEF6, 0x0A00];
+    const VCMP_S0_S1: [u16; 2] = [0xEEB4, 0x0A60];
+    const VMRS_APSR: [u16; 2] = [0xEEF1, 0xFA10];
+    const IT_CC: u16 = 0xBF38;
+    const ADDCC_R3_1: u16 = 0x3301;
+    const BRANCH_TO_VCMP: u16 = 0xE7F8;
+    const STR_R3_R0: u16 = 0x6003;
+
+    let mut handler = store(TIM2 + TIM_SR, 0);
+    handler.extend(load(0, SRAM));
+    handler.push(STR_R3_R0);
+    let mut board = Program::default()
+        .store(CPACR, FULL_ACCESS)
+        .tim2_every(101)
+        .then(VMOV_S0_1)
+        .then(VMOV_S1_HALF)
+        .then([MOVS_R3_0])
+        .then(VCMP_S0_S1)
+        .then(VMRS_APSR)
+        .then([IT_CC, ADDCC_R3_1, BRANCH_TO_VCMP])
+        .handler(TIM2_EXCEPTION, handler)
+        .board();
+    board.run(Time::from_ms(10));
+    assert!(board.stats().irq(28).expect("was taken").count > 1000);
+    assert_eq!(board.word(SRAM), Some(0), "1 is never less than a half");
+}
