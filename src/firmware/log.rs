@@ -6,7 +6,6 @@ use crate::{counters::Counts, measured};
 use canmaster::{
     NodeId,
     boot::Event,
-    emcy::EmcyCode,
     master::{Notice, Report},
     motion::{FaultCause, GroupEvent, GroupState},
     network::{Network, Node},
@@ -175,7 +174,7 @@ impl News {
                 notice: Notice::Emcy { node, emcy },
                 fault: None,
                 ..
-            }) if matches!(emcy.code, EmcyCode::ERROR_PASSIVE | EmcyCode::HEARTBEAT) => Some(node),
+            }) if emcy.code.is_cut_off() => Some(node),
             _ => None,
         }
     }
