@@ -36,8 +36,8 @@ pub struct RealTime {
     /// How much later than the earliest each SYNC left, by whole microseconds: how
     /// many did so.
     pub histogram: Vec<usize>,
-    /// SYNCs that were late though no single frame of somebody else was in their way,
-    /// and those that came twice.
+    /// SYNCs that were late though no single frame was in their way that may be, and
+    /// those that came twice.
     pub unexplained: usize,
     /// How many SYNCs one behind the other were late, at most, each by a frame that was
     /// on the wire when it was due.
@@ -172,20 +172,27 @@ fn histogram(late: &[f64]) -> Vec<usize> {
     counts
 }
 
-/// A late SYNC has an excuse: a frame of somebody else that was on the wire when it was
+/// A late SYNC has an excuse: a frame that was on the wire when it was
 /// due on the grid (or came before it within what counts as on time), and that it
 /// followed at once. That goes for each of several late ones in a row: who counts from
-/// a late SYNC instead of the grid has no such frame. The master sees to it that its
-/// own frames are in no SYNC's way, and a second SYNC in the same cycle has no excuse.
+/// a late SYNC instead of the grid has no such frame. A frame of the master itself is one
+/// only if it had to wait for a frame of a drive: the master begins nothing that would be
+/// in the way. A second SYNC in the same cycle has no excuse.
 fn unexplained(records: &[WireRecord], late: &[Late], board: PortId) -> usize {
     let ps = |us: f64| Time((us * PS_PER_US as f64) as u64);
+    let before = |place: usize| place.checked_sub(1).and_then(|at| records.get(at));
+    let at_once = |frame: &WireRecord, next: &WireRecord| next.sof <= frame.end + ps(ON_TIME_US);
+    let of_drive = |frame: &WireRecord| !frame.transmitters.contains(&board);
     let excused = |late: &Late| {
         let sync = &records[late.place];
-        let before = late.place.checked_sub(1).and_then(|at| records.get(at));
-        before.is_some_and(|frame| {
+        before(late.place).is_some_and(|frame| {
             let due = sync.sof - ps(late.us) + ps(ON_TIME_US);
-            let others = !frame.transmitters.contains(&board);
-            others && frame.sof <= due && sync.sof <= frame.end + ps(ON_TIME_US)
+            let waited = || {
+                let first = late.place.checked_sub(1).and_then(before);
+                first.is_some_and(|first| of_drive(first) && at_once(first, frame))
+            };
+            let allowed = of_drive(frame) || !is_sync(frame) && waited();
+            allowed && frame.sof <= due && at_once(frame, sync)
         })
     };
     let without_excuse = |late: &&Late| late.us > ON_TIME_US && !excused(late);

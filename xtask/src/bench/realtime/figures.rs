@@ -50,7 +50,10 @@ pub(crate) struct Figures {
     sdo_exchanges_per_s: f64,
     /// SYNC and the PDOs of every cycle at worst, on the fullest bus.
     wire_bound_us: u32,
-    stack_high_water_bytes: u32,
+    pub(crate) stack_high_water_bytes: u32,
+    /// Before that time.
+    #[serde(skip)]
+    pub(crate) missed_before: usize,
     /// What the board says of itself, if it was asked.
     own: Option<Own>,
     seeds: u64,
@@ -171,6 +174,7 @@ impl Figures {
             sdo_exchanges_per_s: answers.unwrap_or(0) as f64 / span,
             wire_bound_us: measured.wire_bound_us,
             stack_high_water_bytes: board.stack_high_water_bytes,
+            missed_before: record.bus.missed.saturating_sub(all.missed),
             own,
             seeds: 1,
             simulated_s: span,
@@ -204,6 +208,7 @@ impl Figures {
         self.sdo_exchanges_per_s = self.sdo_exchanges_per_s.min(other.sdo_exchanges_per_s);
         let stack = &mut self.stack_high_water_bytes;
         *stack = other.stack_high_water_bytes.max(*stack);
+        self.missed_before += other.missed_before;
         self.own = self.own.zip(other.own).map(|(all, own)| all.and(own));
         self.seeds += other.seeds;
         self.simulated_s += other.simulated_s;
