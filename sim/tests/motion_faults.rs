@@ -277,6 +277,41 @@ fn an_overload_that_does_not_end_stops_all() {
     assert_no_panic(&words);
 }
 
+/// The axes are stepped in every cycle, but so late that no RPDO gets out, and so no stop:
+/// the watchdog resets the board, and the drives stop without their master.
+#[test]
+fn an_overload_of_every_cycle_is_found_by_the_watchdog() {
+    const CYCLES: u64 = 100;
+    let irq = irqs::TIM3;
+    let cycle = Time::from(sample().network().cycle);
+    let mut world = moving(image(), 47).unwrap();
+    let runs = |world: &World<'_>| world.board().stats().irq(irq).map_or(0, |irq| irq.count);
+    let before = runs(&world);
+    let mut next = syncs(world.wire()).last().copied().unwrap();
+    while next <= world.now() {
+        next += cycle;
+    }
+    for _ in 0..CYCLES {
+        world.apply(Stimulus::Hang { irq });
+        world.run_until(next - Time::from_us(150));
+        world.apply(Stimulus::Resume { irq });
+        world.run_until(next - Time::from_us(10));
+        if world.board().stats().resets.len() > 1 {
+            break;
+        }
+        next += cycle;
+    }
+    assert_eq!(world.board().stats().resets.len(), 2);
+    assert!(runs(&world) > before + 20, "{}", runs(&world) - before);
+    assert!(world.run_to(world.now() + Time::from_ms(1000), World::at_rest));
+    let words: Vec<String> = world
+        .log()
+        .iter()
+        .map(|(_, line)| line.to_string())
+        .collect();
+    assert_no_panic(&words);
+}
+
 #[test]
 fn a_task_that_never_ends_is_found_by_the_watchdog() {
     // Nothing interrupts that of the SYNC.

@@ -108,6 +108,8 @@ mod app {
         deadline: timers::Deadline,
         axes: &'static mut Axes,
         events_to: Producer<'static, GroupEvent>,
+        /// The RPDOs of the last cycle came too late to be sent.
+        late: bool,
     }
 
     struct NetworkParts {
@@ -193,6 +195,7 @@ mod app {
                     deadline: board.deadline,
                     axes: new_axes(cx.local.group_place, cx.local.axes_place),
                     events_to,
+                    late: false,
                 },
                 supervisor: Supervisor::new(NETWORK),
                 network: NetworkParts {
@@ -358,7 +361,8 @@ mod app {
     /// deadline, whichever is first; once per cycle. Budget: 30 000 cycles. If it
     /// has not run before the next SYNC, that cycle is an overrun: it is counted,
     /// and the drives keep the set-points of the cycle before. Several in a row stop
-    /// the group (`design::LATE_CYCLES_MAX`).
+    /// the group (`design::LATE_CYCLES_MAX`); if none gets out for 100 ms, the watchdog
+    /// resets the board.
     #[task(
         binds = TIM3,
         priority = 3,
@@ -372,8 +376,9 @@ mod app {
             lines::send_now();
         }
         let due = local.deadline.take();
-        if due {
-            // Once per period, whatever else pends the task.
+        if due && !local.late {
+            // Once per period, whatever else pends the task. While no cycle gets its
+            // RPDOs out the drives cannot be stopped by them: then the watchdog does.
             roll::check_in(Task::PdoProducer);
         }
         let syncs = SYNCS.load(Ordering::Relaxed);
@@ -393,7 +398,9 @@ mod app {
         (&mut shared.control, &mut shared.commands).lock(|shared_control, commands| {
             axes.step(&cycle, &control, commands);
             shared_control.axes_enabled = axes.enabled(&control);
+            local.late = false;
             if deadline.elapsed_us() > control.latest_us {
+                local.late = control.leads();
                 // What comes after the window of the SYNC is not sent any more.
                 counters::RPDO_REPLACED.add(1);
                 axes.skip();
@@ -401,6 +408,7 @@ mod app {
                 if axes.write(&cycle, commands, &mut shared.lines) {
                     lines::send_now();
                 }
+                local.late = !lines::in_time(cycle.sync, *shared.phase);
                 if measured::ON {
                     measured::give(Figure::Cycle, shared.phase.elapsed_us());
                 }
