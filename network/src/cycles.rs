@@ -11,23 +11,53 @@ const US_PER_MS: u32 = 1000;
 const MIN_US: u32 = CYCLE_MIN_US as u32;
 const MAX_US: u32 = CYCLE_MAX_US as u32;
 
+/// The last number of a range that passes a test, which those before it do, too. The
+/// first, if none does.
+fn last(range: RangeInclusive<u32>, passes: impl Fn(u32) -> bool) -> u32 {
+    let (mut low, mut high) = range.into_inner();
+    while low < high {
+        let middle = low + (high - low).div_ceil(2);
+        if passes(middle) {
+            low = middle;
+        } else {
+            high = middle - 1;
+        }
+    }
+    low
+}
+
 impl Machine {
-    /// The cycles that all buses pass their check with, in microseconds.
+    /// The cycles that all buses pass their check with, in microseconds, and with which
+    /// every node hears the master's heartbeat in time.
     pub fn cycles(&self) -> RangeInclusive<u32> {
         let of = |bus: &Bus| bus.cycles().into_inner();
         let shortest = self.buses.iter().map(|bus| of(bus).0).max();
         let longest = self.buses.iter().map(|bus| of(bus).1).min();
-        shortest.unwrap_or(MIN_US)..=longest.unwrap_or(MAX_US)
+        let (shortest, longest) = (shortest.unwrap_or(MIN_US), longest.unwrap_or(MAX_US));
+        shortest..=last(shortest..=longest, |cycle| self.is_heard_with(cycle))
+    }
+
+    /// Whether every node hears the master's heartbeat in time.
+    fn is_heard_with(&self, cycle_us: u32) -> bool {
+        self.nodes.iter().all(|node| {
+            let bus = self.buses.get(node.bus);
+            let beat_us = bus.map_or(0, |bus| bus.layout.demand.master_beat_us(cycle_us));
+            let timeout = u32::from(node.master_timeout_ms);
+            timeout == 0 || beat_us.div_ceil(US_PER_MS) < timeout
+        })
     }
 }
 
 impl Bus {
     /// All cycles around the described one that pass the same check, in
-    /// microseconds: the frames fit, and the TPDOs are in before the deadline and
-    /// the RPDOs out after it. A longer cycle may fail where more heartbeats fall
+    /// microseconds: the frames fit, the planned ones get their turn, and the TPDOs are
+    /// in before the deadline and the RPDOs out after it. A longer cycle may fail where more heartbeats fall
     /// into it.
     pub fn cycles(&self) -> RangeInclusive<u32> {
-        self.shortest()..=self.longest()
+        let demand = &self.layout.demand;
+        let range = self.shortest()..=self.longest();
+        let holds = |cycle| demand.holds_what_is_wanted(cycle);
+        *range.start()..=last(range, holds)
     }
 
     fn layout_of(&self, cycle_us: u32) -> Layout {

@@ -73,3 +73,51 @@ fn a_cycle_in_which_more_heartbeats_come_late_is_no_longer_taken() {
     assert_eq!(range, 4_225..=50_000);
     agrees(&range, &tight);
 }
+
+/// A description of `networks` with other lines.
+fn described(name: &str, changes: &[(&str, &str)]) -> Option<canmaster_network::model::Machine> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../networks");
+    let mut text = std::fs::read_to_string(folder.join(name)).unwrap();
+    for (from, to) in changes {
+        assert!(text.contains(from), "{from}");
+        text = text.replace(from, to);
+    }
+    let source = Source::new(name, text.as_bytes());
+    let outcome = read_for_firmware(&source, &mut |file| std::fs::read(folder.join(file)));
+    outcome.machine
+}
+
+/// What a message calls the smallest cycle is the shortest that 1006h may become, where
+/// the deadline follows from the layout.
+#[test]
+fn the_smallest_cycle_that_fits_is_the_shortest_of_1006h() {
+    for name in [
+        "one_bus_2ms",
+        "two_bus_1ms",
+        "three_bus_1ms_full",
+        "one_bus_2ms_disturbed",
+    ] {
+        let machine = described(&format!("{name}.toml"), &[]).unwrap();
+        let smallest = machine.buses.iter().map(|bus| {
+            let demand = &bus.layout.demand;
+            demand.smallest_cycle().unwrap()
+        });
+        assert_eq!(smallest.max(), Some(*machine.cycles().start()), "{name}");
+    }
+}
+
+/// One planned frame in a cycle: the master's heartbeat each 50 ms, SDO in every eighth
+/// cycle and RPDO2 in every 16th leave off at 13/16 of 50 ms.
+#[test]
+fn a_cycle_in_which_the_heartbeat_has_no_slot_is_not_taken() {
+    let name = "one_bus_2ms.toml";
+    let (from, to) = ("cycle_us = 2_000", "cycle_us = 40_624");
+    let longest = |changes: &[(&str, &str)]| described(name, changes).map(|m| *m.cycles().end());
+    assert_eq!(longest(&[]), Some(40_624));
+    assert_eq!(longest(&[(from, to)]), Some(40_624));
+    assert_eq!(longest(&[(from, "cycle_us = 40_625")]), None);
+    // A node that waits for 100 ms hears it in 50 ms and a cycle.
+    let sooner = ("master_timeout_ms = 200", "master_timeout_ms = 80");
+    assert_eq!(longest(&[sooner]), Some(29_000));
+    assert_eq!(longest(&[sooner, (from, "cycle_us = 30_001")]), None);
+}

@@ -182,7 +182,8 @@ fn more_axes_than_it_leads() {
     let more: String = (7..=17).map(node).collect();
     let text = sample()
         .replace("cycle_us = 10_000", "cycle_us = 20_000")
-        .replace("tpdo_deadline_us = 5_000", "tpdo_deadline_us = 9_000");
+        .replace("tpdo_deadline_us = 5_000", "tpdo_deadline_us = 9_000")
+        .replace("compute_us = 200", "compute_us = 340");
     let words = words(&format!("{text}{more}"));
     assert!(
         words.contains("`17`") && words.contains("at most 16 axes"),

@@ -64,7 +64,8 @@ fn the_generated_network_is_the_one_of_the_library() {
     // What comes after the deadline at worst still fits.
     const { assert!(generated::SHORTEST_CYCLE_US > generated::TPDO_DEADLINE_US as u32) };
     assert_eq!((generated::COMPUTE_US, generated::RPDOS_US), (120, 710));
-    assert_eq!(generated::LONGEST_CYCLE_US, 65_535);
+    // The master's heartbeat each 50 ms and ramps in every 16th cycle share a slot.
+    assert_eq!(generated::LONGEST_CYCLE_US, 46_874);
 }
 
 /// SDO and ramps share a slot directly after SYNC, and no heartbeat is in operational.

@@ -12,6 +12,7 @@ use canmaster::{Frame, NodeId};
 use canmaster_sim::board::irqs;
 use canmaster_sim::bus::BusFault;
 use canmaster_sim::drive::{DriveFault, cia402};
+use canmaster_sim::judge::bus::syncs;
 use canmaster_sim::judge::{Outcome, STANDSTILL_RPM};
 use canmaster_sim::time::Time;
 use canmaster_sim::world::trials::{moving, spin_in_motion};
@@ -233,6 +234,82 @@ fn cycles_that_do_not_finish_in_time_stop_all() {
     assert_failed(&record, &["cycles in a row did not finish in time"]);
     // And they are counted.
     assert_logged(&record, "so far: 0 SYNC not sent");
+}
+
+/// In three of each four cycles the axes are not stepped before the next SYNC, for two
+/// seconds.
+fn overloaded(world: &mut World<'_>) {
+    const CYCLES: u64 = 1000;
+    const OF: u64 = 4;
+    let irq = irqs::TIM3;
+    let cycle = Time::from(sample().network().cycle);
+    let mut next = syncs(world.wire()).last().copied().unwrap();
+    while next <= world.now() {
+        next += cycle;
+    }
+    for n in 0..CYCLES {
+        world.apply(Stimulus::Hang { irq });
+        if n % OF == OF - 1 {
+            world.apply(Stimulus::Resume { irq });
+        }
+        world.run_until(next - Time::from_us(10));
+        next += cycle;
+    }
+    world.apply(Stimulus::Resume { irq });
+}
+
+fn assert_no_panic(words: &[String]) {
+    let panicked = |line: &&String| line.to_lowercase().contains("panicked at");
+    assert_eq!(words.iter().find(panicked), None);
+}
+
+/// Every fourth cycle gets out: the group stops by it, and the watchdog does not bite.
+#[test]
+fn an_overload_that_does_not_end_stops_all() {
+    let record = struck(46, None, overloaded);
+    assert_failed(&record, &["cycles in a row did not finish in time"]);
+    assert_eq!(record.board.resets.len(), 1, "the board was switched on");
+    let words: Vec<String> = record
+        .log
+        .iter()
+        .map(|(_, line)| line.to_string())
+        .collect();
+    assert_no_panic(&words);
+}
+
+/// The axes are stepped in every cycle, but so late that no RPDO gets out, and so no stop:
+/// the watchdog resets the board, and the drives stop without their master.
+#[test]
+fn an_overload_of_every_cycle_is_found_by_the_watchdog() {
+    const CYCLES: u64 = 100;
+    let irq = irqs::TIM3;
+    let cycle = Time::from(sample().network().cycle);
+    let mut world = moving(image(), 47).unwrap();
+    let runs = |world: &World<'_>| world.board().stats().irq(irq).map_or(0, |irq| irq.count);
+    let before = runs(&world);
+    let mut next = syncs(world.wire()).last().copied().unwrap();
+    while next <= world.now() {
+        next += cycle;
+    }
+    for _ in 0..CYCLES {
+        world.apply(Stimulus::Hang { irq });
+        world.run_until(next - Time::from_us(150));
+        world.apply(Stimulus::Resume { irq });
+        world.run_until(next - Time::from_us(10));
+        if world.board().stats().resets.len() > 1 {
+            break;
+        }
+        next += cycle;
+    }
+    assert_eq!(world.board().stats().resets.len(), 2);
+    assert!(runs(&world) > before + 20, "{}", runs(&world) - before);
+    assert!(world.run_to(world.now() + Time::from_ms(1000), World::at_rest));
+    let words: Vec<String> = world
+        .log()
+        .iter()
+        .map(|(_, line)| line.to_string())
+        .collect();
+    assert_no_panic(&words);
 }
 
 #[test]

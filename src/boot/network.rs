@@ -227,8 +227,9 @@ impl<const N: usize> NetworkBoot<N> {
         self.node_mut(id).is_some_and(|node| node.lose(false))
     }
 
-    /// The node tells that it has missed the bus or the master (EMCY 8120h, 8130h)
-    /// while nobody expected it to be operational: it is reset and booted again.
+    /// The node tells that it has missed the bus or the master
+    /// ([`EmcyCode::is_cut_off`](crate::emcy::EmcyCode::is_cut_off)) while nobody
+    /// expected it to be operational: it is reset and booted again.
     /// Some drives leave such an error only by that.
     pub fn node_cut_off(&mut self, id: NodeId, now: Instant) {
         self.set_now(now);

@@ -32,6 +32,8 @@ impl EmcyCode {
     pub const HEARTBEAT: EmcyCode = EmcyCode(0x8130);
     /// Recovered from bus-off.
     pub const BUS_OFF_RECOVERED: EmcyCode = EmcyCode(0x8140);
+    /// EPOS4: CAN bus-off.
+    pub const EPOS4_BUS_OFF: EmcyCode = EmcyCode(0x81FD);
     /// CAN-ID collision.
     pub const COB_ID_COLLISION: EmcyCode = EmcyCode(0x8150);
     /// A PDO was too short to be processed.
@@ -54,6 +56,18 @@ impl EmcyCode {
             EmcyCode::EPOS4_OVERLOAD => Class::Warning,
             _ => Class::Fault,
         }
+    }
+
+    /// Whether the node has missed the bus or its master: what was sent to it
+    /// meanwhile, a reset as well, did not reach it.
+    pub const fn is_cut_off(self) -> bool {
+        matches!(
+            self,
+            EmcyCode::ERROR_PASSIVE
+                | EmcyCode::HEARTBEAT
+                | EmcyCode::BUS_OFF_RECOVERED
+                | EmcyCode::EPOS4_BUS_OFF
+        )
     }
 
     /// The code in words: exactly if it is known, else by its range; `None` if
@@ -93,6 +107,14 @@ mod tests {
                 _ => assert_eq!(class, Class::Fault),
             }
         }
+    }
+
+    #[test]
+    fn a_node_that_missed_the_bus_says_so() {
+        let cut_off: std::vec::Vec<u16> = (0..=u16::MAX)
+            .filter(|&code| EmcyCode(code).is_cut_off())
+            .collect();
+        assert_eq!(cut_off, [0x8120, 0x8130, 0x8140, 0x81FD]);
     }
 
     #[test]

@@ -110,6 +110,8 @@ mod app {
 
     struct ProducerParts {
         deadline: timers::Deadline,
+        /// The RPDOs of the last cycle came too late to be sent.
+        late: bool,
     }
 
     struct NetworkParts {
@@ -191,6 +193,7 @@ mod app {
                 period: board.period,
                 producer: ProducerParts {
                     deadline: board.deadline,
+                    late: false,
                 },
                 supervisor: Supervisor::new(NETWORK),
                 network: NetworkParts {
@@ -366,7 +369,8 @@ mod app {
     /// deadline, whichever is first; once per cycle. Budget: 30 000 cycles. If it
     /// has not run before the next SYNC, that cycle is an overrun: it is counted,
     /// and the drives keep the set-points of the cycle before. Several in a row stop
-    /// the group (`design::LATE_CYCLES_MAX`).
+    /// the group (`design::LATE_CYCLES_MAX`); if none gets out for 100 ms, the watchdog
+    /// resets the board.
     #[task(
         binds = TIM3,
         priority = 3,
@@ -380,8 +384,9 @@ mod app {
             lines::send_now();
         }
         let due = local.deadline.take();
-        if due {
-            // Once per period, whatever else pends the task.
+        if due && !local.late {
+            // Once per period, whatever else pends the task. While no cycle gets its
+            // RPDOs out the drives cannot be stopped by them: then the watchdog does.
             roll::check_in(Task::PdoProducer);
         }
         let syncs = SYNCS.load(Ordering::Relaxed);
@@ -401,7 +406,9 @@ mod app {
             axes.read(&cycle, &mut shared.od);
             axes.step(&cycle, &control, commands);
             shared_control.axes_enabled = axes.enabled(&control);
+            local.late = false;
             if deadline.elapsed_us() > control.latest_us {
+                local.late = control.leads();
                 // What comes after the window of the SYNC is not sent any more.
                 counters::RPDO_REPLACED.add(1);
                 axes.skip();
@@ -409,6 +416,7 @@ mod app {
                 if axes.write(&cycle, commands, &mut shared.lines) {
                     lines::send_now();
                 }
+                local.late = !lines::in_time(cycle.sync, *shared.phase);
                 if measured::ON {
                     measured::give(Figure::Cycle, shared.phase.elapsed_us());
                 }

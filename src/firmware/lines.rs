@@ -252,6 +252,12 @@ impl Line {
     }
 }
 
+/// Whether RPDOs that were made just now, after a SYNC, can be sent as they are to be.
+pub(crate) fn in_time(sync: u32, phase: Phase) -> bool {
+    let wait = derived::RPDOS_AFTER_SYNC;
+    sync == SYNCS.load(Relaxed) && (wait || phase.left_us() >= GUARD_US + FRAME_US)
+}
+
 fn is_sdo(id: CobId) -> bool {
     let function = id.split().map(|(function, _)| function);
     matches!(

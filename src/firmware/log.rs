@@ -6,7 +6,6 @@ use crate::{counters::Counts, measured};
 use canmaster::{
     NodeId,
     boot::Event,
-    emcy::EmcyCode,
     master::{Notice, Report},
     motion::{Cause, FaultCause, GroupEvent, GroupState},
     network::{Network, Node},
@@ -175,9 +174,7 @@ impl News {
             return None;
         };
         match report.notice {
-            Notice::Emcy { node, emcy }
-                if matches!(emcy.code, EmcyCode::ERROR_PASSIVE | EmcyCode::HEARTBEAT) =>
-            {
+            Notice::Emcy { node, emcy } if emcy.code.is_cut_off() => {
                 report.fault().is_none().then_some(node)
             }
             _ => None,

@@ -26,7 +26,7 @@ pub use od::{
     Cycle, IMAGE_BYTES, MasterOd, Reception, TPDOS_PER_AXIS, TpdoSlot, TpdoSlots, WrongLength,
 };
 pub use overload::Overload;
-pub use ramps::Ramps;
+pub use ramps::{RAMPS_AGAIN, Ramps};
 pub use roll_call::RollCall;
 pub use supervisor::{Advice, Notice, Report, Supervisor};
 pub use tx_queue::{Overflow, Pending, Put, TxQueue, holds, room};

@@ -25,7 +25,7 @@ impl<const AXES: usize> Ramps<AXES> {
     }
 
     /// The axis that gets RPDO2 in this cycle: the next whose ramps changed. If
-    /// none did, one in turn every 16 cycles.
+    /// none did, one in turn every [`RAMPS_AGAIN`] cycles.
     pub fn due(&mut self, commands: &[AxisCommand; AXES]) -> Option<usize> {
         self.idle = self.idle.wrapping_add(1);
         for _ in 0..AXES {
@@ -36,7 +36,7 @@ impl<const AXES: usize> Ramps<AXES> {
                 return None;
             };
             let ramps = (command.acceleration, command.deceleration);
-            if *sent != ramps || self.idle >= AGAIN {
+            if *sent != ramps || self.idle >= RAMPS_AGAIN {
                 *sent = ramps;
                 self.idle = 0;
                 return Some(self.turn);
@@ -47,7 +47,7 @@ impl<const AXES: usize> Ramps<AXES> {
 }
 
 /// Cycles without a change after which ramps are sent again.
-const AGAIN: u8 = 16;
+pub const RAMPS_AGAIN: u8 = 16;
 
 impl<const AXES: usize> Default for Ramps<AXES> {
     fn default() -> Ramps<AXES> {

@@ -43,7 +43,8 @@ pub struct Tuning {
 
 impl Tuning {
     /// For drives with a velocity loop of 3 .. 10 ms: the gain falls with the delay
-    /// of the loop, 1.5 cycles and the lag.
+    /// of the loop, 1.5 cycles and the lag; the lag is learned in the same time at
+    /// every cycle.
     pub const fn for_cycle(cycle: Duration) -> Tuning {
         /// The product of gain and delay.
         const GAIN_BY_DELAY: f32 = 0.3;
@@ -53,12 +54,18 @@ impl Tuning {
         const FIRST_LAG_US: f32 = 5_000.0;
         const LAG_MAX_US: f32 = 15_000.0;
         const CYCLES: f32 = 1.5;
+        /// What of an error is learned in a cycle of 10 ms, and in every longer one.
+        const LEARNING: f32 = 0.03;
+        const NOMINAL_US: f32 = 10_000.0;
+        const fn least(a: f32, b: f32) -> f32 {
+            if a < b { a } else { b }
+        }
         let cycle_us = cycle.as_micros() as f32;
         Tuning {
             gain: GAIN_BY_DELAY / (CYCLES + LAG_US / cycle_us),
             lag: FIRST_LAG_US / cycle_us,
             lag_max: LAG_MAX_US / cycle_us,
-            learning: 0.03,
+            learning: LEARNING * least(cycle_us / NOMINAL_US, 1.0),
             correction_rpm: 60.0,
             creep_rpm: 3.0,
             dead_band: 1.0,
@@ -227,6 +234,9 @@ mod tests {
         };
         assert!((per_second(10) - 12.0).abs() < 1e-5);
         assert!(per_second(2) > 20.0 && per_second(50) < 4.0);
+        let learning = |ms: u32| Tuning::for_cycle(Duration::from_millis(ms)).learning;
+        assert_eq!([learning(10), learning(50)], [0.03, 0.03]);
+        assert!((learning(1) - 0.003).abs() < 1e-9);
     }
 
     #[test]

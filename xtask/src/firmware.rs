@@ -1,9 +1,11 @@
 //! Building the image that is flashed, and that the emulated board boots.
 
-use std::fs;
+use std::fs::{self, File};
 use std::hash::{DefaultHasher, Hash, Hasher};
+use std::io;
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode, Stdio};
+use std::process::{self, Command, ExitCode, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 use anyhow::{Context, Result, bail};
 use serde::Deserialize;
@@ -96,9 +98,14 @@ fn folder(description: &Path) -> String {
     format!("{name}-{:08x}", hasher.finish() as u32)
 }
 
+/// Within this file's lock an image is built and taken out of cargo's own place.
+const LOCK: &str = "lock";
+
 fn make(mut command: Command, machine: &str) -> Result<PathBuf> {
     toolchain::ensure_target()?;
     frame_pointers::leave_out(&mut command);
+    let images = cargo::workspace().join("target").join(IMAGES);
+    let _lock = locked(&images)?;
     let output = command
         .arg("--message-format=json-render-diagnostics")
         .stdin(Stdio::null())
@@ -113,12 +120,31 @@ fn make(mut command: Command, machine: &str) -> Result<PathBuf> {
         );
     }
     let built = executable(&output.stdout).context("cargo built no executable of that name")?;
-    let kept = cargo::workspace().join("target").join(IMAGES).join(machine);
-    fs::create_dir_all(&kept).with_context(|| kept.display().to_string())?;
-    let kept = kept.join(BINARY);
-    // In one step, for somebody may be reading the last one.
-    let new = kept.with_extension("new");
-    fs::copy(&built, &new).with_context(|| new.display().to_string())?;
+    keep(&built, &images.join(machine))
+}
+
+/// Waits until nobody else is building: of two at once the second would take cargo's
+/// place before the first has copied what it built. Until the file is dropped.
+fn locked(images: &Path) -> Result<File> {
+    fs::create_dir_all(images).with_context(|| images.display().to_string())?;
+    let path = images.join(LOCK);
+    let open = || -> io::Result<File> {
+        let file = File::create(&path)?;
+        file.lock()?;
+        Ok(file)
+    };
+    open().with_context(|| path.display().to_string())
+}
+
+/// Copies an image into a folder of its own. In one step, for somebody may be reading
+/// the last one, and by a name of its own, for somebody may be doing the same.
+fn keep(built: &Path, folder: &Path) -> Result<PathBuf> {
+    fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    let kept = folder.join(BINARY);
+    static TURN: AtomicU32 = AtomicU32::new(0);
+    let turn = TURN.fetch_add(1, Relaxed);
+    let new = folder.join(format!("{BINARY}.{}.{turn}", process::id()));
+    fs::copy(built, &new).with_context(|| new.display().to_string())?;
     fs::rename(&new, &kept).with_context(|| kept.display().to_string())?;
     Ok(kept)
 }
@@ -151,6 +177,8 @@ fn executable(messages: &[u8]) -> Option<PathBuf> {
 
 #[cfg(test)]
 mod tests {
+    use std::{env, thread};
+
     use super::*;
 
     #[test]
@@ -159,6 +187,48 @@ mod tests {
         assert!(folder(one).starts_with("mine-"));
         assert_ne!(folder(one), folder(other));
         assert_eq!(folder(one), folder(one));
+    }
+
+    #[test]
+    fn many_may_keep_an_image_at_once() {
+        const SIZE: usize = 1 << 18;
+        let dir = env::temp_dir().join(format!("canmaster-keep-{}", process::id()));
+        fs::create_dir_all(&dir).unwrap();
+        let kept = dir.join("machine");
+        let built: Vec<PathBuf> = (0..4)
+            .map(|n| {
+                let path = dir.join(format!("built-{n}"));
+                fs::write(&path, vec![n; SIZE]).unwrap();
+                path
+            })
+            .collect();
+        keep(&built[0], &kept).unwrap();
+        thread::scope(|scope| {
+            for built in &built {
+                scope.spawn(|| (0..20).for_each(|_| drop(keep(built, &kept).unwrap())));
+            }
+            // Whoever was last, it is a whole one.
+            for _ in 0..50 {
+                let bytes = fs::read(kept.join(BINARY)).unwrap();
+                assert_eq!(bytes.len(), SIZE);
+                assert!(bytes.iter().all(|byte| *byte == bytes[0]));
+            }
+        });
+        let left = fs::read_dir(&kept).unwrap().count();
+        fs::remove_dir_all(&dir).unwrap();
+        assert_eq!(left, 1);
+    }
+
+    #[test]
+    fn one_builds_at_a_time() {
+        let dir = env::temp_dir().join(format!("canmaster-lock-{}", process::id()));
+        let first = locked(&dir).unwrap();
+        let second = File::open(dir.join(LOCK)).unwrap();
+        assert!(second.try_lock().is_err());
+        drop(first);
+        second.lock().unwrap();
+        drop(second);
+        fs::remove_dir_all(&dir).unwrap();
     }
 
     #[test]

@@ -100,6 +100,11 @@ pub(crate) fn good(record: &Record) -> Result<()> {
     Ok(())
 }
 
+/// Longer than any needs, and shorter than the master's heartbeat.
+const LONG_MS: u32 = 55;
+/// The master's heartbeat, for twelve drives at 125 kbit/s need a cycle of 49 ms.
+const HEARTBEAT_MS: u32 = 60;
+
 impl Variant {
     /// In words.
     pub(crate) fn name(&self) -> String {
@@ -149,7 +154,7 @@ impl Variant {
 
     /// The shortest cycle of whole milliseconds that the check lets through.
     fn shortest_cycle(&self, sample: &str, dir: &std::path::Path) -> Result<u32> {
-        let text = self.describe(sample, u32::from(u16::MAX) / MS_US * MS_US);
+        let text = self.describe(sample, LONG_MS * MS_US);
         let name = dir.join(DESCRIPTION).display().to_string();
         let source = Source::new(name, text.as_bytes());
         let outcome = read_for_firmware(&source, &mut |file| fs::read(file));
@@ -165,9 +170,14 @@ impl Variant {
         let common = sample.split(NODES).next().unwrap_or_default();
         let mut text = String::new();
         let mut skip = false;
+        let mut of_master = true;
         for line in common.lines() {
             let key = line.split('=').next().unwrap_or_default().trim();
             match key {
+                "heartbeat_ms" if of_master => {
+                    of_master = false;
+                    let _ = writeln!(text, "heartbeat_ms = {HEARTBEAT_MS}");
+                }
                 "bit_rate" => {
                     let _ = writeln!(text, "bit_rate = {}", self.bit_rate);
                 }
@@ -175,7 +185,7 @@ impl Variant {
                     let _ = writeln!(text, "cycle_us = {cycle_us}");
                 }
                 // They follow from the others.
-                "tpdo_deadline_us" | "guard_us" => skip = true,
+                "tpdo_deadline_us" | "compute_us" | "guard_us" => skip = true,
                 // The rest of their comment.
                 "" if skip => {}
                 _ if skip && line.trim_start().starts_with('#') && line.starts_with(' ') => {}
@@ -230,6 +240,12 @@ mod tests {
         for bit_rate in BIT_RATES {
             assert!(FOUR.iter().any(|variant| variant.bit_rate == bit_rate));
         }
+    }
+
+    #[test]
+    fn the_check_knows_how_often_ramps_are_sent() {
+        let again = u64::from(canmaster::master::RAMPS_AGAIN);
+        assert_eq!(again, canmaster_network::layout::RAMPS_AGAIN);
     }
 
     #[test]

@@ -18,6 +18,7 @@ pub(crate) fn capacity(
     let described: Vec<&description::Bus> =
         description.bus.values().map(|bus| bus.get_ref()).collect();
     same_cycle(&described, &buses, context);
+    same_order(&described, context);
     let demands: Vec<Demand> = buses
         .iter()
         .enumerate()
@@ -38,6 +39,7 @@ pub(crate) fn capacity(
         })
         .collect();
     let layouts = in_order(&described, &buses, &demands);
+    let any_order = described.iter().all(|bus| bus.rpdos.is_none());
     let tries = layouts.iter().zip(&buses).zip(&described);
     for ((layout, bus), described) in tries {
         if layout.lacks_only_sdo() {
@@ -49,7 +51,7 @@ pub(crate) fn capacity(
                 &at,
                 cycle.get_ref(),
                 too_much(&bus.name, layout),
-                change(layout, described.rpdos.is_none()),
+                change(layout, any_order),
             );
         }
     }
@@ -88,6 +90,26 @@ fn same_cycle(described: &[&description::Bus], buses: &[Bus], context: &mut Cont
                 "give all buses the same cycle_us",
             );
         }
+    }
+}
+
+/// The axes of all buses are stepped together, and their RPDOs go in one order.
+fn same_order(described: &[&description::Bus], context: &mut Context<'_>) {
+    let mut orders = described.iter().filter_map(|bus| bus.rpdos.as_ref());
+    let Some(first) = orders.next() else {
+        return;
+    };
+    if let Some(other) = orders.find(|other| other.get_ref() != first.get_ref()) {
+        let at = context.at(other);
+        context.problems.error(
+            &at,
+            other.get_ref(),
+            format!(
+                "the axes of all buses are stepped together, and another bus has rpdos = \"{}\"",
+                first.get_ref()
+            ),
+            "give all buses the same rpdos, or leave it out",
+        );
     }
 }
 
@@ -209,7 +231,7 @@ fn too_much(bus: &str, layout: &Layout) -> String {
     )
 }
 
-/// `any_order`: the description leaves the order of the RPDOs open.
+/// `any_order`: no bus says in which order its RPDOs go.
 fn change(layout: &Layout, any_order: bool) -> String {
     let what = match layout.largest() {
         SlotKind::Tpdo => "map fewer TPDOs",
@@ -227,15 +249,21 @@ fn change(layout: &Layout, any_order: bool) -> String {
         };
         demand.smallest_cycle()
     };
+    let orders = [
+        (RpdoOrder::AfterTpdos, "after the TPDOs"),
+        (RpdoOrder::AfterSync, "after SYNC"),
+    ];
+    let best = orders
+        .iter()
+        .filter_map(|(order, words)| Some((smallest(*order)?, words)));
+    let best = best.min_by_key(|(cycle, _)| *cycle);
     let here = smallest(layout.demand.order);
-    let with = |order| smallest(order).filter(|us| here.is_none_or(|here| *us < here));
-    let sooner = with(RpdoOrder::AfterSync);
-    match (here, sooner) {
-        (_, Some(cycle)) if any_order => {
+    match (here, best) {
+        (_, Some((cycle, _))) if any_order => {
             format!("the smallest cycle that fits is {cycle} us; or {what}")
         }
-        (_, Some(cycle)) if cycle <= layout.cycle_us => {
-            format!("leave rpdos out: after SYNC, {cycle} us fit; or {what}")
+        (_, Some((cycle, words))) if cycle <= layout.cycle_us => {
+            format!("leave rpdos out: {words}, {cycle} us fit; or {what}")
         }
         (Some(cycle), _) => format!("the smallest cycle that fits is {cycle} us; or {what}"),
         (None, _) => {

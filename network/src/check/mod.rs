@@ -1,6 +1,7 @@
 //! Rules between the parts of a description.
 
 mod bits;
+mod budget;
 mod capacity;
 mod configuration;
 mod error_control;
@@ -9,6 +10,7 @@ mod identifiers;
 mod liveness;
 
 pub(crate) use bits::{bit_rates, peripherals};
+pub(crate) use budget::budget;
 pub(crate) use capacity::capacity;
 pub(crate) use configuration::configuration;
 pub(crate) use error_control::error_control;

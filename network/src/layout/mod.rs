@@ -18,12 +18,17 @@
 mod demand;
 mod sdo;
 mod timeline;
+mod wanted;
 
 #[cfg(test)]
 mod tests;
 
 pub use demand::{Cyclic, Demand, RpdoOrder};
 pub use sdo::Window;
+pub(crate) use wanted::PARTS;
+pub use wanted::RAMPS_AGAIN;
+
+use crate::resolve::CYCLE_MIN_US;
 
 /// What a slot is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -87,8 +92,6 @@ pub(crate) const NS_PER_S: u64 = 1_000_000_000;
 pub(crate) const NS_PER_US: u64 = 1000;
 pub(crate) const US_PER_MS: u32 = 1000;
 pub(crate) const PER_MILLE: u64 = 1000;
-/// Cycles are looked for in steps of 50 us.
-const STEP_US: u32 = 50;
 /// The longest cycle that is looked for: a second.
 const LONGEST_US: u32 = 1_000_000;
 
@@ -98,14 +101,14 @@ impl Demand {
         timeline::layout(self, cycle_us)
     }
 
-    /// The smallest cycle that fits, in microseconds, in steps of 50; `None` if
-    /// a second is not enough.
+    /// The smallest cycle that fits, in microseconds, and that the firmware is made
+    /// for; `None` if a second is not enough.
     pub fn smallest_cycle(&self) -> Option<u32> {
-        let mut cycle = STEP_US;
+        let mut cycle = CYCLE_MIN_US as u32;
         // A longer cycle may hold more heartbeats, so it is tried again.
         while cycle <= LONGEST_US {
             let layout = self.layout(cycle);
-            let least = layout.least_cycle_us().next_multiple_of(STEP_US);
+            let least = layout.least_cycle_us();
             if least <= cycle {
                 return Some(cycle);
             }

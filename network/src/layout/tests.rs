@@ -38,12 +38,12 @@ fn six_axes_fit_two_milliseconds_and_not_one() {
     assert!(demand.layout(2000).fits());
     assert!(!demand.layout(1000).fits());
     assert_eq!(demand.layout(2000).bits(), 1435);
-    assert_eq!(demand.smallest_cycle(), Some(1450));
+    assert_eq!(demand.smallest_cycle(), Some(1435));
     let limited = Demand {
         load_limit: 900,
         ..demand
     };
-    assert_eq!(limited.smallest_cycle(), Some(1600));
+    assert_eq!(limited.smallest_cycle(), Some(1595));
 }
 
 #[test]

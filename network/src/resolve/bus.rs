@@ -18,6 +18,10 @@ pub(crate) const CYCLE_MAX_US: i64 = u16::MAX as i64;
 const PERIPHERALS: [(&str, u8); 3] = [("FDCAN1", 1), ("FDCAN2", 2), ("FDCAN3", 3)];
 /// From the last TPDO to the first RPDO, as measured with room to spare.
 const COMPUTE_US: u32 = 200;
+/// What each axis takes of that at worst, in the cycle in which all of them begin to
+/// move: `pdo_producer` takes up to 20 250 cycles of 170 MHz for six axes, preempted by
+/// `sync_tick` and `can_irq` (docs/performance.md).
+const COMPUTE_AXIS_US: u32 = 20;
 /// A request and its answer.
 const SDO_FRAMES: u32 = 2;
 /// An answer to every request of every node and more.
@@ -25,7 +29,7 @@ const SDO_FRAMES_MAX: i64 = 256;
 /// One of every node and more.
 const EMCY_FRAMES_MAX: i64 = 256;
 /// An exchange in a minute at the longest cycle.
-const SDO_EVERY_MAX: i64 = 1000;
+pub(crate) const SDO_EVERY_MAX: i64 = 1000;
 /// 90 % of the cycle.
 const LOAD_LIMIT: u32 = 900;
 const PERCENT_TO_PER_MILLE: f64 = 10.0;
@@ -39,9 +43,16 @@ const ORDERS: [(&str, RpdoOrder); 2] = [
     ("after SYNC", RpdoOrder::AfterSync),
 ];
 
+/// The least from the last TPDO to the first RPDO with which the firmware leads so many
+/// axes, in microseconds.
+pub(crate) fn least_compute_us(axes: usize) -> u32 {
+    COMPUTE_AXIS_US.saturating_mul(u32::try_from(axes).unwrap_or(u32::MAX))
+}
+
 pub(super) fn bus(
     name: &Spanned<String>,
     bus: &description::Bus,
+    axes: usize,
     context: &mut Context<'_>,
 ) -> Option<Bus> {
     let peripheral = peripheral(&bus.peripheral, context);
@@ -69,7 +80,7 @@ pub(super) fn bus(
     let cycle_us = cycle_us?;
     let demand = Demand {
         load_limit: load_limit?,
-        compute_us: compute_us.unwrap_or(Some(COMPUTE_US))?,
+        compute_us: compute_us.unwrap_or(Some(COMPUTE_US.max(least_compute_us(axes))))?,
         // A frame that was started just before must be over.
         guard_us: match guard_us {
             Some(us) => us?,

@@ -8,7 +8,7 @@ mod find;
 mod pdo;
 mod value;
 
-pub(crate) use bus::{CYCLE_MAX_US, CYCLE_MIN_US};
+pub(crate) use bus::{CYCLE_MAX_US, CYCLE_MIN_US, SDO_EVERY_MAX, least_compute_us};
 pub(crate) use context::Context;
 
 use std::collections::BTreeMap;
@@ -48,7 +48,12 @@ pub(crate) fn machine(
     let master = master(&description.master, &mut context);
     let mut buses = Vec::new();
     for (name, bus) in &description.bus {
-        buses.push(bus::bus(name, bus.get_ref(), &mut context));
+        buses.push(bus::bus(
+            name,
+            bus.get_ref(),
+            description.node.len(),
+            &mut context,
+        ));
     }
     let missing_tpdos = match &description.liveness.missing_tpdos {
         Some(count) => context.number(count, "missing_tpdos", 1..=u8::MAX.into())?,
@@ -85,11 +90,12 @@ pub(crate) fn machine(
         return None;
     }
     check::peripherals(description, &buses, &mut context);
-    check::error_control(description, &master, &nodes, &mut context);
     check::liveness(description, liveness, &nodes, &mut context);
     check::bit_rates(description, &files, &buses, &nodes, &mut context);
     check::configuration(description, &files, &master, &nodes, &mut context);
     let buses = check::capacity(description, buses, &master, &nodes, &mut context);
+    check::error_control(description, &master, &buses, &nodes, &mut context);
+    check::budget(description, &buses, &nodes, &mut context);
     if for_firmware && !context.problems.has_errors() {
         check::firmware(description, &nodes, &mut context);
     }

@@ -13,7 +13,7 @@ pub const TPDO_DEADLINE_US: u16 = 1130;
 pub const TPDO_MISSING_LIMIT: u8 = 3;
 /// The SYNC periods (1006h) that pass the check of the description, us.
 pub const SHORTEST_CYCLE_US: u32 = 1960;
-pub const LONGEST_CYCLE_US: u32 = 65535;
+pub const LONGEST_CYCLE_US: u32 = 46874;
 /// From the last TPDO of a cycle to its first RPDO, us.
 pub const COMPUTE_US: u16 = 120;
 /// From the first RPDO of a cycle to the end of the last and the guard, us.

@@ -165,6 +165,8 @@ impl Board {
         /// Interrupt set-enable registers of the NVIC (ARMv7-M, B3.4.4).
         const ISER: u32 = 0xE000_E100;
         self.write_nvic(ISER, irq);
+        // It may have waited for that: a core that sleeps wakes.
+        self.poke = true;
         self.shared.dirty.store(true, Ordering::Relaxed);
     }
 

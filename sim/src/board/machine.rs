@@ -62,7 +62,7 @@ pub struct Board {
     stalled_until: u64,
     locked: bool,
     /// Something may have woken the core.
-    poke: bool,
+    pub(super) poke: bool,
     in_fault: bool,
     /// Held in reset (or without power) since then.
     pub(super) held: Option<(Time, ResetCause)>,

@@ -15,9 +15,17 @@ use crate::time::{PS_PER_S, PS_PER_US, Time};
 const ON_TIME_US: f64 = 2.0;
 /// How often the grid is laid again through the SYNCs that are on time.
 const PASSES: usize = 3;
-/// The part of a COB-ID above the node-ID, of RPDO1 to RPDO4 (CiA 301, 7.3.5).
-const RPDOS: [u16; 4] = [0x200, 0x300, 0x400, 0x500];
-const FUNCTION_MASK: u16 = 0x780;
+const PARTS_PER_MILLION: f64 = 1e6;
+
+/// The RPDOs of one bus that the master has ready together, by their COB-IDs: while
+/// one of them waits, the wire is not to be idle.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Bursts {
+    /// Those that are ready before a SYNC and go directly after it.
+    pub after_sync: Vec<u16>,
+    /// Those that are ready when the TPDOs have been answered to.
+    pub after_tpdos: Vec<u16>,
+}
 
 /// Figures of one bus.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -28,39 +36,66 @@ pub struct RealTime {
     /// How much later than the earliest each SYNC left, by whole microseconds: how
     /// many did so.
     pub histogram: Vec<usize>,
-    /// SYNCs that were late though no single frame was in their way.
+    /// SYNCs that were late though no single frame was in their way that may be, and
+    /// those that came twice.
     pub unexplained: usize,
-    /// The longest silence of the bus between the first and the last RPDO of a
-    /// number in a cycle, beyond the interframe space, in bits.
+    /// How many SYNCs one behind the other were late, at most, each by a frame that was
+    /// on the wire when it was due.
+    pub late_in_a_row: usize,
+    /// How far the SYNCs' grid is from the cycle that was asked for, in parts per
+    /// million: the board's crystal, or SYNCs that are counted from late ones.
+    pub drift_ppm: f64,
+    /// The longest silence of the bus within one of its [`Bursts`], the SYNC before
+    /// included, beyond the interframe space, in bits.
     pub burst_gap_bits: f64,
     /// Answers of the SDO servers of the bus's nodes.
     pub sdo_answers: usize,
 }
 
+/// A SYNC among the records.
+struct Late {
+    /// Its place in them.
+    place: usize,
+    /// Its number on the grid.
+    number: u64,
+    /// How much later it left than the earliest did.
+    us: f64,
+}
+
 /// Judges what was on the wire while the nodes were operational. `board` is the
 /// master's port.
-pub fn judge(records: &[WireRecord], traffic: &Traffic, board: PortId) -> RealTime {
-    let late = lateness(records, traffic.cycle);
-    let microseconds: Vec<f64> = late.iter().map(|(_, us)| *us).collect();
+pub fn judge(
+    records: &[WireRecord],
+    traffic: &Traffic,
+    bursts: &Bursts,
+    board: PortId,
+) -> RealTime {
+    let (late, period_us) = lateness(records, traffic.cycle);
+    let microseconds: Vec<f64> = late.iter().map(|sync| sync.us).collect();
     let bit = Time(PS_PER_S / u64::from(traffic.bit_rate.max(1)));
+    let cycle_us = traffic.cycle.as_us_f64();
     RealTime {
         jitter_pp_us: peak_to_peak(&microseconds),
         histogram: histogram(&microseconds),
-        unexplained: unexplained(records, &late),
-        burst_gap_bits: burst_gap(records, board).as_us_f64() / bit.as_us_f64(),
+        unexplained: unexplained(records, &late, board),
+        late_in_a_row: late_in_a_row(&microseconds),
+        drift_ppm: (period_us / cycle_us - 1.0).abs() * PARTS_PER_MILLION,
+        burst_gap_bits: burst_gap(records, bursts, board).as_us_f64() / bit.as_us_f64(),
         sdo_answers: sdo_answers(records, &traffic.nodes),
     }
 }
 
-/// The place of each SYNC in the records, and how much later it left than the
-/// earliest did, against a grid through those that were on time.
-fn lateness(records: &[WireRecord], cycle: Time) -> Vec<(usize, f64)> {
+/// The SYNCs, and the period of their grid, in microseconds. The grid goes through
+/// those that were on time, so that one that was late moves none of the others.
+fn lateness(records: &[WireRecord], cycle: Time) -> (Vec<Late>, f64) {
     let (places, points) = numbered(records, cycle);
-    let late = match grid_of(&points) {
-        Some(grid) => lateness_on(&grid, &points),
-        None => vec![0.0; points.len()],
+    let (late, period) = match grid_of(&points) {
+        Some(grid) => (lateness_on(&grid, &points), grid.period),
+        None => (vec![0.0; points.len()], cycle.as_us_f64()),
     };
-    places.into_iter().zip(late).collect()
+    let syncs = places.into_iter().zip(points).zip(late);
+    let syncs = syncs.map(|((place, (number, _)), us)| Late { place, number, us });
+    (syncs.collect(), period)
 }
 
 /// The greatest distance between the SYNCs of all buses, each from one grid that they
@@ -137,55 +172,74 @@ fn histogram(late: &[f64]) -> Vec<usize> {
     counts
 }
 
-/// A late SYNC has an excuse: a frame that was on the wire when it was due (or came
-/// before it within what counts as on time), and that it followed at once.
-fn unexplained(records: &[WireRecord], late: &[(usize, f64)]) -> usize {
+/// A late SYNC has an excuse: a frame that was on the wire when it was
+/// due on the grid (or came before it within what counts as on time), and that it
+/// followed at once. That goes for each of several late ones in a row: who counts from
+/// a late SYNC instead of the grid has no such frame. A frame of the master itself is one
+/// only if it had to wait for a frame of a drive: the master begins nothing that would be
+/// in the way. A second SYNC in the same cycle has no excuse.
+fn unexplained(records: &[WireRecord], late: &[Late], board: PortId) -> usize {
     let ps = |us: f64| Time((us * PS_PER_US as f64) as u64);
-    let excused = |place: usize, us: f64| {
-        let sync = &records[place];
-        let before = place.checked_sub(1).and_then(|place| records.get(place));
-        before.is_some_and(|frame| {
-            let due = sync.sof - ps(us) + ps(ON_TIME_US);
-            frame.sof <= due && sync.sof <= frame.end + ps(ON_TIME_US)
+    let before = |place: usize| place.checked_sub(1).and_then(|at| records.get(at));
+    let at_once = |frame: &WireRecord, next: &WireRecord| next.sof <= frame.end + ps(ON_TIME_US);
+    let of_drive = |frame: &WireRecord| !frame.transmitters.contains(&board);
+    let excused = |late: &Late| {
+        let sync = &records[late.place];
+        before(late.place).is_some_and(|frame| {
+            let due = sync.sof - ps(late.us) + ps(ON_TIME_US);
+            let waited = || {
+                let first = late.place.checked_sub(1).and_then(before);
+                first.is_some_and(|first| of_drive(first) && at_once(first, frame))
+            };
+            let allowed = of_drive(frame) || !is_sync(frame) && waited();
+            allowed && frame.sof <= due && at_once(frame, sync)
         })
     };
-    late.iter()
-        .filter(|(place, us)| *us > ON_TIME_US && !excused(*place, *us))
-        .count()
+    let without_excuse = |late: &&Late| late.us > ON_TIME_US && !excused(late);
+    let twice = |pair: &&[Late]| pair[0].number == pair[1].number;
+    late.iter().filter(without_excuse).count() + late.windows(2).filter(twice).count()
 }
 
-/// Which RPDO of a node a frame of the board is.
-fn rpdo(record: &WireRecord, board: PortId) -> Option<usize> {
-    if !record.transmitters.contains(&board) {
-        return None;
-    }
+fn late_in_a_row(late: &[f64]) -> usize {
+    let rows = late.chunk_by(|one, next| (*one > ON_TIME_US) == (*next > ON_TIME_US));
+    let late_rows = rows.filter(|row| row.iter().all(|us| *us > ON_TIME_US));
+    late_rows.map(<[f64]>::len).max().unwrap_or(0)
+}
+
+/// The COB-ID of a frame of the board.
+fn id_from(record: &WireRecord, board: PortId) -> Option<u16> {
     match &record.kind {
-        RecordKind::Frame(frame) => match frame.id {
-            WireId::Standard(id) => RPDOS.iter().position(|code| id & FUNCTION_MASK == *code),
+        RecordKind::Frame(frame) if record.transmitters.contains(&board) => match frame.id {
+            WireId::Standard(id) => Some(id),
             WireId::Extended(_) => None,
         },
-        RecordKind::ErrorFrame { .. } => None,
+        _ => None,
     }
 }
 
-fn burst_gap(records: &[WireRecord], board: PortId) -> Time {
+fn burst_gap(records: &[WireRecord], bursts: &Bursts, board: PortId) -> Time {
     let mut worst = Time::ZERO;
-    // Of each RPDO: the longest silence since the last one in this cycle.
-    let mut open: [Option<Time>; RPDOS.len()] = [None; RPDOS.len()];
+    // The longest silence since the SYNC of this cycle, and since the first RPDO after
+    // the TPDOs.
+    let (mut since_sync, mut since_first) = (None, None);
     let mut end = None;
     for record in records {
         if let Some(end) = end {
             let silence = record.sof.since(end);
-            for gap in open.iter_mut().flatten() {
+            for gap in [&mut since_sync, &mut since_first].into_iter().flatten() {
                 *gap = silence.max(*gap);
             }
         }
         if is_sync(record) {
-            open = [None; RPDOS.len()];
+            (since_sync, since_first) = (Some(Time::ZERO), None);
         }
-        if let Some(number) = rpdo(record, board) {
-            worst = worst.max(open[number].unwrap_or(Time::ZERO));
-            open[number] = Some(Time::ZERO);
+        let id = id_from(record, board);
+        if id.is_some_and(|id| bursts.after_sync.contains(&id)) {
+            worst = worst.max(since_sync.unwrap_or(Time::ZERO));
+        }
+        if id.is_some_and(|id| bursts.after_tpdos.contains(&id)) {
+            worst = worst.max(since_first.unwrap_or(Time::ZERO));
+            since_first = Some(Time::ZERO);
         }
         end = Some(record.end);
     }
@@ -204,127 +258,5 @@ fn sdo_answers(records: &[WireRecord], nodes: &[NodeId]) -> usize {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::frame::WireFrame;
-
-    const BOARD: PortId = PortId(0);
-    const DRIVE: PortId = PortId(1);
-    const BITS: u32 = 100;
-
-    fn record(us: u64, id: u16, from: PortId) -> WireRecord {
-        WireRecord {
-            sof: Time::from_us(us),
-            end: Time::from_us(us + u64::from(BITS)),
-            bits: BITS,
-            transmitters: vec![from],
-            kind: RecordKind::Frame(WireFrame::standard(id, &[])),
-        }
-    }
-
-    fn traffic() -> Traffic {
-        Traffic {
-            bit_rate: 1_000_000,
-            cycle: Time::from_us(2000),
-            nodes: (1..=2).filter_map(NodeId::new).collect(),
-        }
-    }
-
-    fn syncs(count: u64) -> Vec<WireRecord> {
-        (0..count)
-            .map(|n| record(1000 + 2000 * n, 0x080, BOARD))
-            .collect()
-    }
-
-    #[test]
-    fn sync_on_the_grid_is_on_time() {
-        let figures = judge(&syncs(100), &traffic(), BOARD);
-        assert!(figures.jitter_pp_us < 1e-6);
-        assert_eq!(figures.histogram, [100]);
-        assert_eq!(figures.unexplained, 0);
-    }
-
-    #[test]
-    fn a_late_sync_needs_a_frame_in_its_way() {
-        let mut records = syncs(100);
-        records[50] = record(1000 + 2000 * 50 + 60, 0x080, BOARD);
-        let late = judge(&records, &traffic(), BOARD);
-        assert!((late.jitter_pp_us - 60.0).abs() < 0.01, "{late:?}");
-        assert_eq!((late.histogram[0], late.histogram.iter().sum()), (99, 100));
-        assert_eq!(late.unexplained, 1);
-        // A frame that ends where the SYNC begins, and began before it was due.
-        records.insert(50, record(1000 + 2000 * 50 - 40, 0x701, DRIVE));
-        assert_eq!(judge(&records, &traffic(), BOARD).unexplained, 0);
-        // One that began after that is none of its business.
-        records[50] = record(1000 + 2000 * 50 + 20, 0x701, DRIVE);
-        assert_eq!(judge(&records, &traffic(), BOARD).unexplained, 1);
-    }
-
-    #[test]
-    fn many_late_ones_do_not_bend_the_grid() {
-        let mut records = syncs(200);
-        for n in (120..200).step_by(2) {
-            records[n] = record(1000 + 2000 * n as u64 + 130, 0x080, BOARD);
-        }
-        let figures = judge(&records, &traffic(), BOARD);
-        assert!((figures.jitter_pp_us - 130.0).abs() < 0.01, "{figures:?}");
-        assert_eq!(figures.unexplained, 40);
-    }
-
-    #[test]
-    fn buses_have_one_grid() {
-        let shifted = |us: u64| -> Vec<WireRecord> {
-            (0..100)
-                .map(|n| record(1000 + us + 2000 * n, 0x080, BOARD))
-                .collect()
-        };
-        let cycle = Time::from_us(2000);
-        let (one, mut other) = (shifted(0), shifted(1));
-        let all = |other: &[WireRecord]| jitter_of_all(&[&one, other], cycle);
-        assert!((all(&other) - 1.0).abs() < 1e-6);
-        other[50] = record(1000 + 2000 * 50 + 41, 0x080, BOARD);
-        assert!((all(&other) - 41.0).abs() < 1e-6);
-        assert_eq!(jitter_of_all(&[], cycle), 0.0);
-    }
-
-    #[test]
-    fn silence_within_a_burst_counts_whoever_ends_it() {
-        let burst = |gaps: [u64; 2]| {
-            let second = 1400 + 100 + gaps[0];
-            let third = second + 100 + gaps[1];
-            vec![
-                record(1000, 0x080, BOARD),
-                record(1400, 0x201, BOARD),
-                record(second, 0x701, DRIVE),
-                record(third, 0x202, BOARD),
-                // Another burst, after a silence that is nobody's fault.
-                record(third + 500, 0x301, BOARD),
-                record(3000, 0x080, BOARD),
-                record(3300, 0x201, BOARD),
-            ]
-        };
-        let gap = |records: &[WireRecord]| judge(records, &traffic(), BOARD).burst_gap_bits;
-        assert_eq!(gap(&burst([0, 0])), 0.0);
-        assert_eq!(gap(&burst([7, 0])), 7.0);
-        assert_eq!(gap(&burst([2, 5])), 5.0);
-        // What others send is no burst of the master.
-        let mut foreign = burst([0, 50]);
-        foreign[3].transmitters = vec![DRIVE];
-        assert_eq!(gap(&foreign), 0.0);
-    }
-
-    #[test]
-    fn answers_of_the_buss_nodes_count() {
-        let records: Vec<_> = [0x581, 0x601, 0x582, 0x583, 0x581]
-            .iter()
-            .zip(0..)
-            .map(|(id, n)| record(1000 + 200 * n, *id, DRIVE))
-            .collect();
-        assert_eq!(judge(&records, &traffic(), BOARD).sdo_answers, 3);
-    }
-
-    #[test]
-    fn nothing_has_no_figures() {
-        assert_eq!(judge(&[], &traffic(), BOARD), RealTime::default());
-    }
-}
+#[path = "realtime_tests.rs"]
+mod tests;

@@ -26,9 +26,8 @@ pub fn arrival_tolerance(cycle: Time) -> i64 {
 /// 10 rpm and falls below 5 rpm 7 ms later; one of 3 ms has been below for 2 ms by then.
 /// Noise and the position loop add the rest.
 pub fn stop_tolerance(cycle: Time) -> Time {
-    const LONG: Time = Time::from_ms(10);
-    const SPREAD: Time = Time::from_ms(12);
-    if cycle < LONG { SPREAD } else { cycle }
+    const SPREAD: Time = Time::from_ms(10);
+    cycle.max(SPREAD)
 }
 
 /// How long interrupts may be off at a time, cycles: SYNC must not wait.
@@ -362,7 +361,7 @@ mod tests {
 
     #[test]
     fn axes_stop_together_within_a_cycle_or_ten_milliseconds() {
-        for (us, allowed_ms) in [(1_000, 12), (2_000, 12), (10_000, 10), (50_000, 50)] {
+        for (us, allowed_ms) in [(1_000, 10), (2_000, 10), (10_000, 10), (50_000, 50)] {
             let allowed = stop_tolerance(Time::from_us(us));
             assert_eq!(allowed, Time::from_ms(allowed_ms));
         }

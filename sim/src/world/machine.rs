@@ -7,10 +7,12 @@ use std::sync::LazyLock;
 use canmaster::motion::experiment::Motor;
 use canmaster::network::Network;
 use canmaster::network::sample::SIX_EPOS4;
+use canmaster_network::layout::{Cyclic, RpdoOrder};
 use canmaster_network::model;
 use canmaster_network::program::{self, Axis, Group, Program};
 
 use super::library::{self, LibraryError};
+use crate::judge::realtime::Bursts;
 use crate::judge::{Assignment, Part, Traffic};
 use crate::time::Time;
 
@@ -43,6 +45,8 @@ pub struct Segment {
     pub bit_rate: u32,
     /// The axes whose drives are on it, by their place in the network.
     pub axes: Vec<usize>,
+    /// The RPDOs that the master has ready together.
+    pub bursts: Bursts,
 }
 
 /// Network, buses, motors, and the moves that one release makes.
@@ -226,9 +230,37 @@ fn segments(described: &model::Machine) -> Vec<Segment> {
                 controller: usize::from(bus.peripheral.saturating_sub(1)),
                 bit_rate: bus.bit_rate,
                 axes: on_it.map(|(axis, _)| axis).collect(),
+                bursts: bursts(described, bus),
             }
         })
         .collect()
+}
+
+/// What the layout says is ready together.
+fn bursts(described: &model::Machine, bus: &model::Bus) -> Bursts {
+    let ids = |frames: &[Cyclic]| -> Vec<u16> { frames.iter().map(|(id, ..)| *id).collect() };
+    let demand = &bus.layout.demand;
+    let mut bursts = Bursts {
+        after_sync: ids(&demand.ramps),
+        after_tpdos: Vec::new(),
+    };
+    match demand.order {
+        RpdoOrder::AfterSync => bursts.after_sync.extend(ids(&demand.rpdos)),
+        RpdoOrder::AfterTpdos => bursts.after_tpdos.extend(ids(&demand.rpdos)),
+    }
+    // A planned frame goes when its slot is: directly after SYNC, if no RPDO of every
+    // cycle goes there. Without a slot it goes when it is made.
+    let anywhere = |bus: &model::Bus| {
+        let demand = &bus.layout.demand;
+        demand.order == RpdoOrder::AfterSync || !demand.ramps.is_empty()
+    };
+    let slot_is_after_sync = !described.buses.iter().any(anywhere);
+    match (demand.is_planned(), slot_is_after_sync) {
+        (true, true) => bursts.after_sync.extend(ids(&demand.on_change)),
+        (true, false) => (),
+        (false, _) => bursts.after_tpdos.extend(ids(&demand.on_change)),
+    }
+    bursts
 }
 
 /// The sample's only bus.
@@ -238,6 +270,7 @@ fn sample_segment() -> Segment {
         controller: 0,
         bit_rate: SIX_EPOS4.bit_rate,
         axes: (0..SIX_EPOS4.nodes.len()).collect(),
+        bursts: Bursts::default(),
     }
 }
 

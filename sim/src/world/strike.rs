@@ -33,6 +33,10 @@ const START_US: u64 = 3_000_000;
 const WATCHED: Time = Time::from_ms(400);
 /// How often the axes are looked at.
 const LOOK: Time = Time::from_ms(1);
+/// What a drive was told before a stop is still seen in the shaft: three times the
+/// 10 ms of its velocity loop. An axis told to start in the last cycle before the
+/// stop may first exceed the speed that counts as standing then.
+const LOOP_TAIL: Time = Time::from_ms(30);
 /// An axis that shall stop does not become faster than it was by more: noise and
 /// the tail of its loop, rpm.
 const FASTER_RPM: f64 = 40.0;
@@ -293,7 +297,7 @@ impl Strike {
             _ => at,
         };
         let latest = limits.struck.stops_by.max(limits.others.stops_by);
-        world.watch.revoke(known + latest);
+        world.watch.revoke(known + latest + LOOP_TAIL);
         let mut axes: Vec<Stopping> = world.truths().map(|_| Stopping::default()).collect();
         let end = known + limits.struck.stands_by.max(limits.others.stands_by);
         while world.now() < end && !(world.now() > known + latest && world.at_rest()) {

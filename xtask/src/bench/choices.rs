@@ -206,10 +206,11 @@ fn undisturbed(image: &Image, seed: u64) -> Result<(f64, f64, RealTime, BoardSta
     world.run_until(to);
     let stats = world.board().stats();
     let machine = world.machine();
-    let traffic = machine.traffic(&machine.segments()[0]);
+    let segment = &machine.segments()[0];
+    let traffic = machine.traffic(segment);
     let wire = super::realtime::between(world.wire(), from, to);
     let bus = judge_running(wire, &traffic, to);
-    let even = realtime::judge(wire, &traffic, world.board_port());
+    let even = realtime::judge(wire, &traffic, &segment.bursts, world.board_port());
     Ok((bus.load_mean, bus.load_max, even, stats))
 }
 

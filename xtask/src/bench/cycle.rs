@@ -22,6 +22,15 @@ const LIKE: &str = "networks/one_bus_2ms.toml";
 const DESCRIPTION: &str = "network.toml";
 const NODES: &str = "[[node]]";
 const AXES: std::ops::RangeInclusive<u32> = 1..=12;
+/// From the last TPDO to the first RPDO: as [`LIKE`] has it, and what the check asks for
+/// each axis.
+const COMPUTE_US: u32 = 120;
+const COMPUTE_AXIS_US: u32 = 20;
+/// What a campaign looks at.
+const SAMPLES: [u32; 3] = [1, 6, 12];
+/// With as many axes as the sample has the stack may be so deep.
+const STACK_AXES: u32 = 6;
+const STACK_BYTES: u32 = 4096;
 /// Cycles are looked for in steps of this, not below the first.
 const STEP_US: usize = 50;
 const SHORTEST_US: u32 = 500;
@@ -49,6 +58,10 @@ struct Row {
     load_max: f64,
     cpu_load: f64,
     jitter_pp_us: f64,
+    stack_high_water_bytes: u32,
+    /// Cycles without a PDO before all drives were operational, when they still sent
+    /// heartbeats, for which such a cycle has no place.
+    missed_before: usize,
 }
 
 #[derive(Serialize)]
@@ -62,7 +75,10 @@ pub(super) fn run(seed: u64, span: Time, document: bool) -> Result<Outcome> {
     let mut rows = Vec::new();
     for axes in AXES {
         let row = search(axes, seed, span).with_context(|| format!("{axes} axes"))?;
-        eprintln!("{axes} axes: {} us", row.held_us);
+        eprintln!(
+            "{axes} axes: {} us, {} bytes of stack, {} cycles missed before motion",
+            row.held_us, row.stack_high_water_bytes, row.missed_before
+        );
         rows.push(row);
     }
     let missed = missed(&rows);
@@ -125,11 +141,20 @@ fn search(axes: u32, seed: u64, span: Time) -> Result<Row> {
                 load_max: figures.load_max,
                 cpu_load: figures.cpu_load,
                 jitter_pp_us: figures.jitter_pp_us,
+                stack_high_water_bytes: figures.stack_high_water_bytes,
+                missed_before: figures.missed_before,
             });
         }
         eprintln!("does not hold: {}", missed.join("; "));
     }
     anyhow::bail!("no cycle up to {LONGEST_US} us holds")
+}
+
+/// The limits that are missed with a few numbers of axes, in words.
+pub(crate) fn sampled(seed: u64, span: Time) -> Result<Vec<String>> {
+    let of = |axes| search(axes, seed, span).with_context(|| format!("{axes} axes"));
+    let rows: Vec<Row> = SAMPLES.into_iter().map(of).collect::<Result<_>>()?;
+    Ok(missed(&rows))
 }
 
 /// A folder with what a description names.
@@ -162,6 +187,11 @@ fn describe(like: &str, axes: u32, cycle_us: u32) -> String {
         let key = line.split('=').next().unwrap_or_default().trim();
         let _ = match key {
             "cycle_us" => writeln!(text, "cycle_us = {cycle_us}"),
+            "compute_us" => writeln!(
+                text,
+                "compute_us = {}",
+                COMPUTE_US.max(COMPUTE_AXIS_US * axes)
+            ),
             "load_limit" => writeln!(text, "load_limit = 100"),
             // An answer may come in the next cycle.
             "sdo_frames" => writeln!(text, "sdo_frames = 1"),
@@ -188,7 +218,7 @@ fn above_bound(row: &Row) -> u32 {
 
 fn missed(rows: &[Row]) -> Vec<String> {
     let far = rows.iter().filter(|row| above_bound(row) > PERCENT_LIMIT);
-    far.map(|row| {
+    let far = far.map(|row| {
         format!(
             "{} axes: {} us hold, {} % above the layout's bound of {} us; at most \
              {PERCENT_LIMIT} % are allowed",
@@ -197,8 +227,15 @@ fn missed(rows: &[Row]) -> Vec<String> {
             above_bound(row),
             row.layout_bound_us
         )
-    })
-    .collect()
+    });
+    let deep = |row: &&Row| row.axes <= STACK_AXES && row.stack_high_water_bytes > STACK_BYTES;
+    let deep = rows.iter().filter(deep).map(|row| {
+        format!(
+            "{} axes: {} bytes of stack, at most {STACK_BYTES} are allowed",
+            row.axes, row.stack_high_water_bytes
+        )
+    });
+    far.chain(deep).collect()
 }
 
 const HEADING: [&str; 7] = [
@@ -303,9 +340,17 @@ mod tests {
             load_max: 0.85,
             cpu_load: 0.04,
             jitter_pp_us: 1.0,
+            stack_high_water_bytes: 4096,
+            missed_before: 2,
         };
         assert!(missed(&[row(2000), row(2100)]).is_empty());
         assert_eq!(missed(&[row(2150)]).len(), 1);
+        let deep = |axes| Row {
+            axes,
+            stack_high_water_bytes: 4100,
+            ..row(2000)
+        };
+        assert_eq!(missed(&[deep(6), deep(9)]).len(), 1);
         let table = markdown(&[row(2000)]);
         assert_eq!(table.lines().count(), 3);
         assert!(table.ends_with("| 6 | 1435 | 2000 | 2000 | 85.0 % | 4.0 % | 1.00 |\n"));

@@ -3,12 +3,12 @@
 //! functions.
 
 mod choices;
-mod cycle;
+pub(crate) mod cycle;
 pub(crate) mod instructions;
 mod motion;
 pub(crate) mod realtime;
 mod sdo;
-mod self_measurement;
+pub(crate) mod self_measurement;
 mod startup;
 
 use std::process::ExitCode;

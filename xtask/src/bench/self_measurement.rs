@@ -34,6 +34,13 @@ struct Figures {
     scenarios: Vec<Row>,
 }
 
+/// The limits that are missed, in words.
+pub(crate) fn sampled(seed: u64, span: Time) -> Result<Vec<String>> {
+    let of = |case| measure(case, seed, span).context(case.name);
+    let rows: Vec<Row> = CASES.iter().map(of).collect::<Result<_>>()?;
+    Ok(rows.iter().filter_map(Row::missed).collect())
+}
+
 pub(super) fn run(seed: u64, span: Time) -> Result<Outcome> {
     let started = Instant::now();
     let mut scenarios = Vec::new();

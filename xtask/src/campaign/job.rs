@@ -191,6 +191,19 @@ impl Row {
         }
     }
 
+    /// A bench, and the limits that it missed.
+    pub(super) fn of_bench(name: &str, seed: u64, missed: &[String], wall_s: f64) -> Row {
+        Row {
+            seed,
+            kind: name.to_string(),
+            ok: missed.is_empty(),
+            reason: missed.join("; "),
+            wall_s,
+            figures: None,
+            real_time: None,
+        }
+    }
+
     /// A scenario of `bench realtime` with all seeds.
     pub(super) fn real_time(
         case: &'static Case,
@@ -273,6 +286,13 @@ fn words(error: impl ToString) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_bench_that_misses_a_limit_fails_the_campaign() {
+        assert!(Row::of_bench("bench cycle", 1, &[], 1.0).ok);
+        let row = Row::of_bench("bench cycle", 1, &["too far".to_string()], 1.0);
+        assert_eq!((row.ok, row.reason.as_str()), (false, "too far"));
+    }
 
     #[test]
     fn twenty_seeds_cover_every_reset_and_every_hang() {

@@ -13,6 +13,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
 use crate::bench::realtime::{self, CASES};
+use crate::bench::{cycle, self_measurement};
 use crate::cargo;
 use crate::cli::CampaignOptions;
 use crate::machine::Checked;
@@ -28,6 +29,8 @@ const FAULTS: u64 = 200;
 /// Seeds of each scenario of `bench realtime`, and how much of each is looked at.
 const REALTIME_SEEDS: u64 = 5;
 const REALTIME_SPAN: Time = Time::from_ms(30_000);
+/// How much of each is looked at where a bench is sampled.
+const SAMPLE_SPAN: Time = Time::from_ms(1_000);
 
 /// The JSON object.
 #[derive(Serialize)]
@@ -72,6 +75,10 @@ pub(crate) fn command(options: &CampaignOptions) -> Result<ExitCode> {
         .into_iter()
         .chain(networks::all().map(network))
         .chain(real_time(workers))
+        .chain([
+            sampled("bench cycle", cycle::sampled),
+            sampled("bench self-measurement", self_measurement::sampled),
+        ])
         .collect();
     let wall_s = started.elapsed().as_secs_f64();
     let ok = runs.iter().filter(|row| row.ok).count();
@@ -104,6 +111,19 @@ pub(crate) fn command(options: &CampaignOptions) -> Result<ExitCode> {
 fn network(variant: Variant) -> Row {
     eprintln!("{}", variant.name());
     let row = Row::of(variant);
+    if !row.ok {
+        eprintln!("{}: {}", row.kind, row.reason);
+    }
+    row
+}
+
+/// Some of what a bench measures, for a short time.
+fn sampled(name: &str, limits: fn(u64, Time) -> Result<Vec<String>>) -> Row {
+    const SEED: u64 = 1;
+    eprintln!("{name}");
+    let started = Instant::now();
+    let missed = limits(SEED, SAMPLE_SPAN).unwrap_or_else(|error| vec![format!("{error:#}")]);
+    let row = Row::of_bench(name, SEED, &missed, started.elapsed().as_secs_f64());
     if !row.ok {
         eprintln!("{}: {}", row.kind, row.reason);
     }

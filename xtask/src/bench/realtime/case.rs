@@ -25,9 +25,10 @@ const WARNING_DELAY: Spread = Spread::new(0, 1_900);
 const ONE_FRAME_LATE_US: f64 = 135.0 + JITTER_US;
 const JITTER_US: f64 = 2.0;
 const SKEW_US: f64 = 2.0;
-/// From the timer's event to the first and to the last transmit request of a SYNC.
-const FIRST_REQUEST_CYCLES: u64 = 170;
-const LAST_REQUEST_CYCLES: u64 = 260;
+/// From the timer's event to the transmit request of a SYNC, and where there are three
+/// buses to the last of them.
+const REQUEST_CYCLES: u64 = 170;
+const LAST_OF_THREE_CYCLES: u64 = 260;
 /// Beyond the interframe space.
 const BURST_GAP_BITS: f64 = 3.0;
 /// One exchange in ten cycles of 2 ms, one in twenty of 1 ms and bus.
@@ -52,8 +53,8 @@ const QUIET: Limits = Limits {
     jitter_us: JITTER_US,
     skew_us: SKEW_US,
     cpu_load: Some(0.15),
-    first_request_cycles: FIRST_REQUEST_CYCLES,
-    last_request_cycles: LAST_REQUEST_CYCLES,
+    first_request_cycles: REQUEST_CYCLES,
+    last_request_cycles: REQUEST_CYCLES,
     burst_gap_bits: BURST_GAP_BITS,
     exchanges_per_s: Some(EXCHANGES_PER_S),
 };
@@ -82,7 +83,6 @@ pub(crate) const CASES: [Case; 4] = [
         limits: Limits {
             load: Some(LOAD),
             cpu_load: Some(0.05),
-            last_request_cycles: FIRST_REQUEST_CYCLES,
             ..QUIET
         },
     },
@@ -98,7 +98,10 @@ pub(crate) const CASES: [Case; 4] = [
         tuned: |config| answering(config, ANSWER_1MS),
         disturbed: false,
         asked: true,
-        limits: QUIET,
+        limits: Limits {
+            last_request_cycles: LAST_OF_THREE_CYCLES,
+            ..QUIET
+        },
     },
     Case {
         name: "one_bus_2ms_disturbed",
@@ -108,7 +111,6 @@ pub(crate) const CASES: [Case; 4] = [
         limits: Limits {
             jitter_us: ONE_FRAME_LATE_US,
             cpu_load: None,
-            last_request_cycles: FIRST_REQUEST_CYCLES,
             exchanges_per_s: None,
             ..QUIET
         },
@@ -123,7 +125,6 @@ pub(crate) const SEARCHED: Case = Case {
     asked: false,
     limits: Limits {
         cpu_load: None,
-        last_request_cycles: FIRST_REQUEST_CYCLES,
         exchanges_per_s: None,
         ..QUIET
     },

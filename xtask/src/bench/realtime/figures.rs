@@ -13,6 +13,9 @@ use super::case::{Case, Limits};
 use super::own::Own;
 use super::session::Span;
 
+/// The board's crystal is no farther from its frequency, and the SYNCs no farther from
+/// their cycle but for what one of them may be late.
+const DRIFT_PPM: f64 = 101.0;
 /// While a frame is handed to a controller.
 const HELD_CYCLES: f64 = 40.0;
 
@@ -26,8 +29,12 @@ pub(crate) struct Figures {
     pub(crate) jitter_pp_us: f64,
     /// How many SYNCs were so late, by whole microseconds.
     jitter_histogram: Vec<usize>,
-    /// SYNCs that were late without a frame in their way.
+    /// SYNCs that were late without a frame in their way, or came twice.
     late_unexplained: usize,
+    /// Late ones one behind the other, each by a frame of its own.
+    late_in_a_row: usize,
+    /// Of the SYNCs' grid from the cycle.
+    drift_ppm: f64,
     skew_us: f64,
     pub(crate) load_max: f64,
     pub(crate) cpu_load: f64,
@@ -43,7 +50,10 @@ pub(crate) struct Figures {
     sdo_exchanges_per_s: f64,
     /// SYNC and the PDOs of every cycle at worst, on the fullest bus.
     wire_bound_us: u32,
-    stack_high_water_bytes: u32,
+    pub(crate) stack_high_water_bytes: u32,
+    /// Before that time.
+    #[serde(skip)]
+    pub(crate) missed_before: usize,
     /// What the board says of itself, if it was asked.
     own: Option<Own>,
     seeds: u64,
@@ -83,10 +93,11 @@ fn of_bus(bus: &BusRecord, measured: &Measured, index: usize) -> (BusFigures, Re
     let Span { from, to, .. } = measured.span;
     let records = between(&bus.wire, from, to);
     let machine = &measured.record.machine;
-    let traffic = machine.traffic(&machine.segments()[index]);
+    let segment = &machine.segments()[index];
+    let traffic = machine.traffic(segment);
     (
         judge_running(records, &traffic, to),
-        realtime::judge(records, &traffic, bus.board),
+        realtime::judge(records, &traffic, &segment.bursts, bus.board),
     )
 }
 
@@ -116,6 +127,7 @@ impl Figures {
         let Span { from, to, .. } = measured.span;
         let span = (to - from).as_secs_f64();
         let answers = buses.iter().map(|(_, bus)| bus.sdo_answers).min();
+        let in_a_row = buses.iter().map(|(_, bus)| bus.late_in_a_row);
         let mut histogram = Vec::new();
         for (_, bus) in &buses {
             add(&mut histogram, &bus.histogram);
@@ -149,6 +161,8 @@ impl Figures {
             jitter_pp_us: worst(|bus| bus.jitter_pp_us),
             jitter_histogram: histogram,
             late_unexplained: buses.iter().map(|(_, bus)| bus.unexplained).sum(),
+            late_in_a_row: in_a_row.max().unwrap_or(0),
+            drift_ppm: worst(|bus| bus.drift_ppm),
             skew_us: skew(measured),
             load_max: all.load_max,
             cpu_load: board.cpu_load(),
@@ -160,6 +174,7 @@ impl Figures {
             sdo_exchanges_per_s: answers.unwrap_or(0) as f64 / span,
             wire_bound_us: measured.wire_bound_us,
             stack_high_water_bytes: board.stack_high_water_bytes,
+            missed_before: record.bus.missed.saturating_sub(all.missed),
             own,
             seeds: 1,
             simulated_s: span,
@@ -177,6 +192,8 @@ impl Figures {
         self.jitter_pp_us = self.jitter_pp_us.max(other.jitter_pp_us);
         add(&mut self.jitter_histogram, &other.jitter_histogram);
         self.late_unexplained += other.late_unexplained;
+        self.late_in_a_row = self.late_in_a_row.max(other.late_in_a_row);
+        self.drift_ppm = self.drift_ppm.max(other.drift_ppm);
         self.skew_us = self.skew_us.max(other.skew_us);
         self.load_max = self.load_max.max(other.load_max);
         self.cpu_load = self.cpu_load.max(other.cpu_load);
@@ -191,6 +208,7 @@ impl Figures {
         self.sdo_exchanges_per_s = self.sdo_exchanges_per_s.min(other.sdo_exchanges_per_s);
         let stack = &mut self.stack_high_water_bytes;
         *stack = other.stack_high_water_bytes.max(*stack);
+        self.missed_before += other.missed_before;
         self.own = self.own.zip(other.own).map(|(all, own)| all.and(own));
         self.seeds += other.seeds;
         self.simulated_s += other.simulated_s;
@@ -229,6 +247,7 @@ impl Figures {
         at_most("SYNC jitter [us]", self.jitter_pp_us, jitter_us);
         let late = self.late_unexplained as f64;
         at_most("SYNCs late without a frame in their way", late, 0.0);
+        at_most("drift of the SYNCs [ppm]", self.drift_ppm, DRIFT_PPM);
         at_most("skew between buses [us]", self.skew_us, skew_us);
         if let Some(limit) = load {
             at_most("load of the worst cycle", self.load_max, limit);
