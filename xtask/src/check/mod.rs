@@ -3,6 +3,7 @@
 mod json;
 
 use std::fs;
+use std::ops::RangeInclusive;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -45,7 +46,7 @@ pub(crate) fn command(options: &CheckOptions) -> Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     for bus in &machine.buses {
-        show(bus);
+        show(bus, machine.cycles());
     }
     println!(
         "{}: {}, {}; derived files are in {}",
@@ -57,7 +58,8 @@ pub(crate) fn command(options: &CheckOptions) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn show(bus: &Bus) {
+/// `cycles`: those that all buses pass their check with.
+fn show(bus: &Bus, cycles: RangeInclusive<u32>) {
     let layout = &bus.layout;
     println!(
         "bus \"{}\": FDCAN{}, {} bit/s, sample point {}.{} %, cycle {} us",
@@ -100,7 +102,7 @@ fn show(bus: &Bus) {
     println!("{cycle}\n{}", picture(layout, WIDTH));
     println!("{}", summary(layout));
     println!("{}", plan(layout));
-    let (shortest, longest) = bus.cycles().into_inner();
+    let (shortest, longest) = cycles.into_inner();
     println!("1006h may be written {shortest} .. {longest} us\n");
 }
 
