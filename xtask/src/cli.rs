@@ -135,6 +135,9 @@ pub(crate) struct RunOptions {
     /// clock; without --seconds until Ctrl-C
     #[arg(long, value_name = "PORT")]
     pub(crate) bridge: Option<u16>,
+    /// Nobody presses the board's button: a tool on the bridge commands the group
+    #[arg(long, requires = "bridge")]
+    pub(crate) unattended: bool,
     /// Least severe log lines of the firmware that are shown
     #[arg(long, value_name = "LEVEL", default_value = "info")]
     pub(crate) log: LogLevel,

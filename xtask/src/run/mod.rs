@@ -49,8 +49,8 @@ pub(crate) fn command(options: &RunOptions) -> Result<ExitCode> {
     let image = checked.image(&elf)?;
     let started = Instant::now();
     let mut scenario = scenario(options, &checked.machine);
-    if program.is_some() {
-        // Nobody presses the button before the program is there.
+    if program.is_some() || options.unattended {
+        // Nobody presses the button before the program is there, or at all.
         scenario = scenario.unattended();
     }
     let mut progress = Progress::new(options, &checked.machine, scenario.end);
