@@ -18,7 +18,7 @@ use canmaster::{
     boot::NetworkBoot,
     design,
     device::{Event, MasterError, Setting},
-    motion::{Director, GroupEvent, panel::Panel},
+    motion::{Director, panel::Panel},
     nmt::State,
     time::{Duration, Instant},
 };
@@ -149,10 +149,8 @@ impl<'a> Configurator<'a> {
         let director = &mut *self.local.director;
         let panel = &mut *self.local.panel;
         let plan = self.shared.axes.lock(|axes| {
-            if core::mem::take(&mut axes.pressed)
-                && let Err(why) = director.run(axes.group)
-            {
-                axes.group.report(GroupEvent::ReleaseRefused(why));
+            if core::mem::take(&mut axes.pressed) {
+                director.press(axes.group);
             }
             panel.poll(axes.group);
             let program = panel.program().unwrap_or(PROGRAM.as_slice());

@@ -2,7 +2,7 @@
 
 use crate::motion::mode::Mode;
 use crate::motion::position_control::Tuning;
-use crate::motion::program::{Reason, Refusal};
+use crate::motion::program::{Judged, Reason, Refusal};
 use crate::motion::scale::Scale;
 use crate::time::Duration;
 
@@ -33,15 +33,14 @@ pub struct AxisConfig {
 }
 
 impl AxisConfig {
-    /// Whether a target, counted from home, lies within the travel.
-    ///
-    /// # Errors
-    /// With the end that is passed.
-    pub(in crate::motion) fn reaches(&self, axis: u8, target: i32) -> Result<(), Refusal> {
+    /// Whether a target, counted from home, lies within the travel; if not, the end
+    /// that is passed.
+    #[inline(never)]
+    pub(in crate::motion) fn reaches(&self, target: i32, why: &mut Refusal) -> Judged {
         let (lower, upper) = self.travel;
         let end = if target < 0 { lower } else { upper };
         if target.unsigned_abs() > end.unsigned_abs() {
-            return Err(Refusal::of(axis, Reason::Target, target as u32, end as u32));
+            return why.because(Reason::Target, target as u32, end as u32);
         }
         Ok(())
     }

@@ -10,6 +10,7 @@
 //! | 15..0 | detail |
 
 use super::mode::Mode;
+use super::program::{Judged, Refused};
 use super::{
     AxisMove, Director, FaultCause, Group, GroupConfig, GroupEvent, GroupState, Order, Reason,
     Refusal,
@@ -161,8 +162,9 @@ impl<const N: usize> Panel<N> {
         group: &mut Group<N>,
         director: &mut Director<N>,
     ) -> Result<(), AbortCode> {
-        let done = self.put(at, value, group, director);
-        self.note(done)
+        let mut why = Refusal::NONE;
+        let done = self.put(at, value, group, director, &mut why);
+        self.note(done, &why)
     }
 
     fn put(
@@ -171,16 +173,17 @@ impl<const N: usize> Panel<N> {
         value: u32,
         group: &mut Group<N>,
         director: &mut Director<N>,
-    ) -> Result<(), Refusal> {
+        why: &mut Refusal,
+    ) -> Judged {
         let axis = usize::from(at.sub.0).wrapping_sub(1);
         match at.index.0 {
             COMMAND => {
-                self.order(value, group, director)?;
+                self.order(value, group, director, why)?;
                 self.command = value as u8;
             }
             AXES => {
                 if value & !Self::ALL != 0 {
-                    return Err(Refusal::whole(Reason::Unknown, value, Self::ALL));
+                    return why.because(Reason::Unknown, value, Self::ALL);
                 }
                 self.axes = value;
             }
@@ -197,9 +200,9 @@ impl<const N: usize> Panel<N> {
                     _ => {
                         let mode = Mode::of(value as i8).filter(|mode| mode.is_in(limits.modes));
                         let (Some(mode), Some(place)) = (mode, self.modes.get_mut(axis)) else {
+                            why.axis = axis as u8;
                             let code = u32::from(value as u8);
-                            let reason = Reason::NoSuchMode;
-                            return Err(Refusal::of(axis as u8, reason, code, limits.modes));
+                            return why.because(Reason::NoSuchMode, code, limits.modes);
                         };
                         *place = mode;
                     }
@@ -214,10 +217,11 @@ impl<const N: usize> Panel<N> {
         command: u32,
         group: &mut Group<N>,
         director: &mut Director<N>,
-    ) -> Result<(), Refusal> {
+        why: &mut Refusal,
+    ) -> Judged {
         const LAST: u32 = 12;
         let (axes, state) = (self.axes, group.state());
-        group.order(match command {
+        let order = match command {
             0 => return Ok(()),
             1 => Order::Enable,
             2 => Order::Disable,
@@ -232,21 +236,22 @@ impl<const N: usize> Panel<N> {
             },
             9 if state == GroupState::Standby => {
                 self.changing = axes;
-                return self.change_modes(group);
+                return self.change_modes(group, why);
             }
-            10 => return director.go(group, axes, &self.moves, self.jerk),
+            10 => return director.set_moves(group, axes, &self.moves, self.jerk, why),
             // 11 where the group is released already, 12 where it is not.
             11 | LAST if !self.loading && (command == LAST) != (state == GroupState::Moving) => {
-                return director.run(group);
+                return director.begin(group, why);
             }
-            9..=LAST => return Err(Refusal::not_in(state)),
-            _ => return Err(Refusal::whole(Reason::Unknown, command, LAST)),
-        })
+            9..=LAST => return why.state(state),
+            _ => return why.because(Reason::Unknown, command, LAST),
+        };
+        group.accept(order, why)
     }
 
     /// Orders the modes that are still to be changed: those of one kind together, one
     /// kind after the other.
-    fn change_modes(&mut self, group: &mut Group<N>) -> Result<(), Refusal> {
+    fn change_modes(&mut self, group: &mut Group<N>, why: &mut Refusal) -> Judged {
         let first = self.changing.trailing_zeros() as usize;
         let Some(&mode) = self.modes.get(first) else {
             return Ok(());
@@ -257,11 +262,11 @@ impl<const N: usize> Panel<N> {
                 axes |= self.changing & 1 << n;
             }
         }
-        let done = group.order(Order::SetMode { axes, mode });
+        let done = group.accept(Order::SetMode { axes, mode }, why);
         match done {
             Ok(()) => self.changing &= !axes,
-            Err(why) if why.reason == Reason::Busy => return Ok(()),
-            Err(_) => self.changing = 0,
+            Err(Refused) if why.reason == Reason::Busy => return Ok(()),
+            Err(Refused) => self.changing = 0,
         }
         done
     }
@@ -273,9 +278,10 @@ impl<const N: usize> Panel<N> {
         }
         match group.state() {
             GroupState::Standby => {
-                let done = self.change_modes(group);
+                let mut why = Refusal::NONE;
+                let done = self.change_modes(group, &mut why);
                 // Nobody waits for the answer.
-                let _ = self.note(done);
+                let _ = self.note(done, &why);
             }
             GroupState::ModeChange => {}
             _ => self.changing = 0,
@@ -314,7 +320,7 @@ impl<const N: usize> Panel<N> {
         director: &Director<N>,
     ) -> Result<(), AbortCode> {
         if state != GroupState::Standby || director.step() != 0 {
-            return self.note(Err(Refusal::not_in(state)));
+            return self.note(Err(Refused), &Refusal::not_in(state));
         }
         self.length = 0;
         self.loading = true;
@@ -330,8 +336,9 @@ impl<const N: usize> Panel<N> {
         if part.last {
             self.loading = false;
             let bytes = self.program.get(..to).unwrap_or_default();
-            let checked = super::format::check(bytes, self.config);
-            self.note(checked)?;
+            let mut why = Refusal::NONE;
+            let checked = super::format::inspect(bytes, self.config, &mut why);
+            self.note(checked, &why)?;
             self.length = to;
         }
         Ok(())
@@ -344,8 +351,10 @@ impl<const N: usize> Panel<N> {
 
     /// Keeps the reason of a refusal.
     #[inline(never)]
-    fn note(&mut self, done: Result<(), Refusal>) -> Result<(), AbortCode> {
-        let Err(why) = done else { return Ok(()) };
+    fn note(&mut self, done: Judged, why: &Refusal) -> Result<(), AbortCode> {
+        if done.is_ok() {
+            return Ok(());
+        }
         let axis = match why.axis {
             Refusal::NO_AXIS => Refusal::NO_AXIS,
             axis => axis + 1,

@@ -27,6 +27,8 @@ pub struct AxisMove {
 #[repr(u8)]
 #[non_exhaustive]
 pub enum Reason {
+    /// None: nothing is refused.
+    None = 0,
     /// The order does not count in this state of the group, 2001h.
     State = 1,
     /// The axis' TPDO of this cycle is missing.
@@ -88,9 +90,9 @@ impl Reason {
         let number = *self as u8;
         number
             - if number < Reason::Length as u8 {
-                1
+                0
             } else {
-                GAP + 1
+                GAP
             }
     }
 
@@ -101,6 +103,7 @@ impl Reason {
 }
 
 in_words!(Reason by Reason::place {
+    Reason::None => ("nothing"),
     Reason::State => ("state of the group"),
     Reason::NotFresh => ("TPDO in this cycle"),
     Reason::NotAtRest => ("speed in rpm"),
@@ -129,6 +132,13 @@ in_words!(Reason by Reason::place {
     Reason::Time => ("time in cycles"),
 });
 
+/// A [`Refusal`] says why: it stays in its place, which is shorter than to hand it on.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Refused;
+
+/// What an order, a move or a program is judged.
+pub(super) type Judged = Result<(), Refused>;
+
 /// Why an order, a move or a program cannot be carried out. Nothing has been sent
 /// because of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -150,8 +160,39 @@ impl Refusal {
     /// No single axis.
     pub const NO_AXIS: u8 = u8::MAX;
 
+    /// Nothing is refused.
+    pub(super) const NONE: Refusal = Refusal::whole(Reason::None, 0, 0);
+
+    /// That, as zeros.
+    pub(super) const ZERO: Refusal = Refusal::of(0, Reason::None, 0, 0);
+
+    /// This is it, of the axis and the step that are named already.
+    #[inline(never)]
+    pub(super) fn because(&mut self, reason: Reason, value: u32, allowed: u32) -> Judged {
+        self.reason = reason;
+        self.value = value as i32;
+        self.allowed = allowed as i32;
+        Err(Refused)
+    }
+
+    /// `value`, a magnitude above 0, against the largest that is allowed.
+    #[inline(never)]
+    pub(super) fn within(&mut self, reason: Reason, value: u32, allowed: u32) -> Judged {
+        if value.wrapping_sub(1) < allowed {
+            return Ok(());
+        }
+        self.because(reason, value, allowed)
+    }
+
     /// The last command is not carried out yet.
-    pub(super) const BUSY: Refusal = Refusal::whole(Reason::Busy, 1, 0);
+    pub(super) fn busy(&mut self) -> Judged {
+        self.because(Reason::Busy, 1, 0)
+    }
+
+    /// That is not done in this state.
+    pub(super) fn state(&mut self, state: GroupState) -> Judged {
+        self.because(Reason::State, state as u32, 0)
+    }
 
     /// The group is in a state in which that does not count.
     pub const fn not_in(state: GroupState) -> Refusal {
@@ -189,15 +230,6 @@ in_words!(Refusal {
 
 impl core::error::Error for Refusal {}
 
-/// `value`, a magnitude above 0, against the largest that is allowed.
-#[inline(never)]
-pub(super) fn within(axis: u8, reason: Reason, value: u32, allowed: u32) -> Result<(), Refusal> {
-    if value.wrapping_sub(1) < allowed {
-        return Ok(());
-    }
-    Err(Refusal::of(axis, reason, value, allowed))
-}
-
 impl AxisMove {
     /// The limits of a leg, in increments and cycles.
     pub(super) fn limits(&self, scale: Scale) -> [f32; 3] {
@@ -209,13 +241,10 @@ impl AxisMove {
     }
 
     /// Checks all but the target against the limits of its axis.
-    ///
-    /// # Errors
-    /// [`Refusal`] for the first value that breaks a limit.
-    pub fn keeps(&self, axis: u8, limits: &AxisConfig) -> Result<(), Refusal> {
+    pub(super) fn keeps(&self, limits: &AxisConfig, why: &mut Refusal) -> Judged {
         let most = limits.acceleration_max;
-        within(axis, Reason::Velocity, self.velocity, limits.velocity_max)?;
-        within(axis, Reason::Acceleration, self.acceleration, most)?;
-        within(axis, Reason::Deceleration, self.deceleration, most)
+        why.within(Reason::Velocity, self.velocity, limits.velocity_max)?;
+        why.within(Reason::Acceleration, self.acceleration, most)?;
+        why.within(Reason::Deceleration, self.deceleration, most)
     }
 }

@@ -3,7 +3,7 @@
 use crate::motion::fixed;
 use crate::motion::mode::Mode;
 use crate::motion::path::Knot;
-use crate::motion::program::{AxisMove, Reason, Refusal, within};
+use crate::motion::program::{AxisMove, Judged, Reason, Refusal, Refused};
 use crate::motion::{AxisConfig, GroupConfig, next};
 use crate::sdo::Crc16;
 
@@ -160,11 +160,11 @@ impl<'a> Step<'a> {
     #[inline(never)]
     pub(super) fn check_path(
         &self,
-        axis: u8,
         member: usize,
         limits: &AxisConfig,
         begin: Option<i32>,
-    ) -> Result<f32, Refusal> {
+        why: &mut Refusal,
+    ) -> Result<f32, Refused> {
         const THIRD: f32 = 1.0 / 3.0;
         let mut before = Knot::default();
         let (mut fastest, mut steepest) = (0.0, 0.0);
@@ -188,29 +188,23 @@ impl<'a> Step<'a> {
                 for (from, ahead) in [(&before, from), (&knot, -to)] {
                     let ahead = fixed::fixed(ahead * cycles * THIRD);
                     let at = fixed::round(from.position.wrapping_add(ahead));
-                    limits.reaches(axis, begin.saturating_add(at))?;
+                    limits.reaches(begin.saturating_add(at), why)?;
                 }
             }
             before = knot;
-            within(axis, Reason::Points, knot.cycles, u32::MAX)?;
+            why.within(Reason::Points, knot.cycles, u32::MAX)?;
         }
         let (rpm, slope) = (limits.scale.rpm(fastest), limits.scale.rpm_per_s(steepest));
-        let most = limits.acceleration_max;
-        within(
-            axis,
-            Reason::Velocity,
-            (rpm as u32).max(1),
-            limits.velocity_max,
-        )?;
-        within(axis, Reason::Acceleration, (slope as u32).max(1), most)?;
+        let (rpm, slope) = ((rpm as u32).max(1), (slope as u32).max(1));
+        why.within(Reason::Velocity, rpm, limits.velocity_max)?;
+        why.within(Reason::Acceleration, slope, limits.acceleration_max)?;
         let way = if self.periods() > 1 {
             before.position
         } else {
             0
         };
         if before.velocity | way != 0 {
-            let way = fixed::round(way) as u32;
-            return Err(Refusal::of(axis, Reason::End, way, 0));
+            why.because(Reason::End, fixed::round(way) as u32, 0)?;
         }
         Ok(steepest)
     }
@@ -228,6 +222,16 @@ pub(super) fn steps(bytes: &[u8]) -> &[u8] {
 /// # Errors
 /// The first that is wrong, and in which step.
 pub fn check<const N: usize>(bytes: &[u8], config: &GroupConfig<N>) -> Result<(), Refusal> {
+    let mut why = Refusal::NONE;
+    inspect(bytes, config, &mut why).map_err(|Refused| why)
+}
+
+/// The same.
+pub(in crate::motion) fn inspect<const N: usize>(
+    bytes: &[u8],
+    config: &GroupConfig<N>,
+    why: &mut Refusal,
+) -> Judged {
     let length = bytes.len() as u32;
     let head = number(bytes, 0);
     let summed = bytes.len().saturating_sub(CRC);
@@ -244,29 +248,24 @@ pub fn check<const N: usize>(bytes: &[u8], config: &GroupConfig<N>) -> Result<()
         (Reason::Checksum, crc, sum.get().into()),
     ] {
         if value != allowed {
-            return Err(Refusal::whole(reason, value, allowed));
+            return why.because(reason, value, allowed);
         }
     }
     let steps = steps(bytes);
-    let (mut at, mut number, mut depth) = (0, 0u16, 0u32);
+    let (mut at, mut depth) = (0, 0u32);
     while at < steps.len() {
-        number = number.saturating_add(1);
+        why.step = why.step.saturating_add(1);
         let step = Step::at(steps, at);
         at += step.len();
-        let checked = if at > steps.len() {
-            let end = steps.len() as u32;
-            Err(Refusal::whole(Reason::Length, at as u32, end))
-        } else {
-            check_step(&step, &mut depth, config)
-        };
-        checked.map_err(|error| Refusal {
-            step: number,
-            ..error
-        })?;
+        if at > steps.len() {
+            return why.because(Reason::Length, at as u32, steps.len() as u32);
+        }
+        check_step(&step, &mut depth, config, why)?;
     }
+    why.step = 0;
     match depth {
         0 => Ok(()),
-        depth => Err(Refusal::whole(Reason::Loop, depth, 0)),
+        depth => why.because(Reason::Loop, depth, 0),
     }
 }
 
@@ -275,7 +274,8 @@ fn check_step<const N: usize>(
     step: &Step<'_>,
     depth: &mut u32,
     config: &GroupConfig<N>,
-) -> Result<(), Refusal> {
+    why: &mut Refusal,
+) -> Judged {
     match step.kind {
         WAIT => return Ok(()),
         LOOP | END_LOOP => {
@@ -287,17 +287,17 @@ fn check_step<const N: usize>(
             *depth = then;
             return match now {
                 1..=4 => Ok(()),
-                _ => Err(Refusal::whole(Reason::Loop, now, LOOPS as u32)),
+                _ => why.because(Reason::Loop, now, LOOPS as u32),
             };
         }
         MOVE | PATH | HOME | MODE => {}
-        kind => return Err(Refusal::whole(Reason::Step, kind.into(), MODE.into())),
+        kind => return why.because(Reason::Step, kind.into(), MODE.into()),
     }
     if step.axes == 0 || step.axes >> N != 0 {
-        return Err(Refusal::whole(Reason::Members, step.axes, (1 << N) - 1));
+        return why.because(Reason::Members, step.axes, (1 << N) - 1);
     }
     if step.kind == PATH && (step.points() == 0 || step.periods() == 0) {
-        return Err(Refusal::whole(Reason::Points, step.value, 0));
+        return why.because(Reason::Points, step.value, 0);
     }
     let (mut left, mut member) = (step.axes, 0);
     while let Some(axis) = next(&mut left) {
@@ -305,7 +305,7 @@ fn check_step<const N: usize>(
             break;
         };
         let absolute = !step.has(RELATIVE);
-        let number = axis as u8;
+        why.axis = axis as u8;
         let mode = if step.kind == HOME {
             Mode::Homing.code()
         } else {
@@ -314,22 +314,22 @@ fn check_step<const N: usize>(
         match step.kind {
             MOVE => {
                 let part = step.part(member);
-                part.keeps(number, limits)?;
+                part.keeps(limits, why)?;
                 if absolute {
-                    limits.reaches(number, part.target)?;
+                    limits.reaches(part.target, why)?;
                 }
             }
             PATH => {
                 let begin = absolute.then(|| step.begin(member));
-                step.check_path(number, member, limits, begin)?;
+                step.check_path(member, limits, begin, why)?;
             }
             _ if Mode::of(mode).is_some_and(|mode| mode.is_in(limits.modes)) => {}
             _ => {
-                let allowed = limits.modes;
-                return Err(Refusal::of(number, Reason::Mode, mode as u32, allowed));
+                return why.because(Reason::Mode, mode as u32, limits.modes);
             }
         }
         member += 1;
     }
+    why.axis = Refusal::NO_AXIS;
     Ok(())
 }

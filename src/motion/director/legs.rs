@@ -4,7 +4,7 @@ use super::format::{RELATIVE, Step};
 use super::{Director, LATER_MAX, LEAD, Phase, format, limits};
 use crate::motion::group::{Group, SetPoint};
 use crate::motion::mode::Mode;
-use crate::motion::program::{AxisMove, Reason, Refusal, within};
+use crate::motion::program::{AxisMove, Judged, Reason, Refusal, Refused};
 use crate::motion::{fixed, next, plan};
 
 /// Points of a path that are handed over in one look, since the group waits.
@@ -18,7 +18,7 @@ impl<const N: usize> Director<N> {
     }
 
     /// The legs of a step.
-    pub(super) fn set_legs(&mut self, group: &Group<N>, step: &Step<'_>) -> Result<bool, Refusal> {
+    pub(super) fn set_legs(&mut self, group: &Group<N>, step: &Step<'_>) -> Result<bool, Refused> {
         self.clear();
         let (mut left, mut member) = (step.axes, 0);
         while let Some(axis) = next(&mut left) {
@@ -38,8 +38,10 @@ impl<const N: usize> Director<N> {
         part: &AxisMove,
         relative: bool,
         jerk: u32,
-    ) -> Result<(), Refusal> {
-        let number = axis as u8;
+    ) -> Judged {
+        let why = &mut self.error;
+        *why = Refusal::NONE;
+        why.axis = axis as u8;
         let (Some(limits), Some(of), Some(leg)) = (
             limits(self.config).get(axis),
             group.axis(axis),
@@ -58,12 +60,12 @@ impl<const N: usize> Director<N> {
             let end = fixed::round(of.path.end());
             target = target.saturating_add(end.wrapping_sub(home));
         }
-        part.keeps(number, limits)?;
+        part.keeps(limits, why)?;
         if torque {
             let value = target.unsigned_abs().max(1);
-            within(number, Reason::Torque, value, limits.torque_max.into())?;
+            why.within(Reason::Torque, value, limits.torque_max.into())?;
         } else {
-            limits.reaches(number, target)?;
+            limits.reaches(target, why)?;
         }
         leg.set = Some(part.set);
         leg.target = target.wrapping_add(home);
@@ -79,7 +81,7 @@ impl<const N: usize> Director<N> {
         &mut self,
         group: &mut Group<N>,
         step: &Step<'_>,
-    ) -> Result<bool, Refusal> {
+    ) -> Result<bool, Refused> {
         let lead = LEAD + self.later;
         self.start = group.count().wrapping_add(lead);
         for (axis, leg) in self.legs.iter_mut().enumerate() {
@@ -92,8 +94,9 @@ impl<const N: usize> Director<N> {
             if self.path {
                 if step.axes >> axis & 1 != 0 && !mode.has_position() {
                     // Its drive moves it by itself, or it is no motion.
-                    let allowed = Mode::WITH_POSITION;
-                    return Err(Refusal::of(axis as u8, Reason::Mode, mode as u32, allowed));
+                    self.error.axis = axis as u8;
+                    let (mode, allowed) = (mode as u32, Mode::WITH_POSITION);
+                    self.error.because(Reason::Mode, mode, allowed)?;
                 }
             } else if leg.set.is_some() && mode == Mode::ProfilePosition {
                 group.set_ramps(axis, leg.acceleration, leg.deceleration);
@@ -120,26 +123,29 @@ impl<const N: usize> Director<N> {
         self.judge(result);
     }
 
-    fn plan(&mut self, step: &Step<'_>) -> Result<bool, Refusal> {
+    fn plan(&mut self, step: &Step<'_>) -> Result<bool, Refused> {
+        let why = &mut self.error;
         if !self.path
             && let Err(axis) = plan::plan(&mut self.legs)
         {
-            return Err(Refusal::of(axis, Reason::Time, u32::MAX, plan::CYCLES_MAX));
+            why.axis = axis;
+            why.because(Reason::Time, u32::MAX, plan::CYCLES_MAX)?;
         }
         let mut member = 0;
         let all = self.legs.iter_mut().zip(limits(self.config));
         for (axis, (leg, limits)) in (0..).zip(all) {
+            why.axis = axis;
             let from = fixed::round(leg.from.position).wrapping_sub(leg.home);
             if !self.path {
                 if leg.set.is_some() && leg.turn != 0.0 {
-                    limits.reaches(axis, from.saturating_add(leg.turn as i32))?;
+                    limits.reaches(from.saturating_add(leg.turn as i32), why)?;
                 }
             } else if step.axes >> axis & 1 != 0 {
                 let told = step.begin(member);
                 if !step.has(RELATIVE) && from != told {
-                    return Err(Refusal::of(axis, Reason::Begin, from as u32, told as u32));
+                    why.because(Reason::Begin, from as u32, told as u32)?;
                 }
-                let slope = step.check_path(axis, member, limits, Some(from))?;
+                let slope = step.check_path(member, limits, Some(from), why)?;
                 (leg.up, leg.down) = (slope, slope);
                 member += 1;
             }

@@ -11,7 +11,7 @@ use self::format::{FLYING, Step};
 use super::group::{Group, Order};
 use super::mode::Mode;
 use super::plan::Leg;
-use super::program::Refusal;
+use super::program::{Judged, Refusal, Refused};
 use super::{AxisConfig, AxisMove, GroupConfig, GroupEvent, GroupState};
 use heapless::Vec;
 
@@ -81,7 +81,7 @@ pub struct Director<const N: usize> {
     /// Cycles until the next look is needed; 0: something happens before.
     patience: u32,
     /// Why a plan could not be made.
-    error: Option<Refusal>,
+    error: Refusal,
     loops: Vec<Loop, { format::LOOPS }>,
     legs: [Leg; N],
 }
@@ -103,7 +103,7 @@ impl<const N: usize> Director<N> {
         start: 0,
         later: 0,
         patience: 0,
-        error: None,
+        error: Refusal::ZERO,
         loops: Vec::new(),
         legs: [const { Leg::ZERO }; N],
     };
@@ -137,11 +137,18 @@ impl<const N: usize> Director<N> {
     /// # Errors
     /// [`Refusal`] of the group, or because something else is being done.
     pub fn run(&mut self, group: &mut Group<N>) -> Result<(), Refusal> {
+        let mut why = Refusal::NONE;
+        self.begin(group, &mut why).map_err(|Refused| why)
+    }
+
+    /// The same.
+    #[inline(never)]
+    pub(super) fn begin(&mut self, group: &mut Group<N>, why: &mut Refusal) -> Judged {
         let state = group.state();
         if state == GroupState::Moving {
-            self.is_free(group)?;
+            self.is_free(group, why)?;
         } else {
-            group.order(Order::Release)?;
+            group.accept(Order::Release, why)?;
         }
         if !(self.running && state == GroupState::Halt) {
             self.running = true;
@@ -153,12 +160,12 @@ impl<const N: usize> Director<N> {
     }
 
     /// Whether it can be told to move.
-    fn is_free(&self, group: &Group<N>) -> Result<(), Refusal> {
+    fn is_free(&self, group: &Group<N>, why: &mut Refusal) -> Judged {
         if group.state() != GroupState::Moving {
-            return Err(Refusal::not_in(group.state()));
+            return why.state(group.state());
         }
         if self.running || matches!(self.phase, Phase::Plan | Phase::Planned) {
-            return Err(Refusal::BUSY);
+            return why.busy();
         }
         Ok(())
     }
@@ -176,16 +183,39 @@ impl<const N: usize> Director<N> {
         parts: &[AxisMove; N],
         jerk: u32,
     ) -> Result<(), Refusal> {
-        self.is_free(group)?;
+        let mut why = Refusal::NONE;
+        let done = self.set_moves(group, axes, parts, jerk, &mut why);
+        done.map_err(|Refused| why)
+    }
+
+    /// The same.
+    pub(super) fn set_moves(
+        &mut self,
+        group: &Group<N>,
+        axes: u32,
+        parts: &[AxisMove; N],
+        jerk: u32,
+        why: &mut Refusal,
+    ) -> Judged {
+        self.is_free(group, why)?;
         self.clear();
         for (axis, part) in parts.iter().enumerate() {
             if axes >> axis & 1 != 0 {
-                self.set_leg(group, axis, part, false, jerk)?;
+                let set = self.set_leg(group, axis, part, false, jerk);
+                *why = self.error;
+                set?;
             }
         }
         (self.path, self.flying) = (false, false);
         self.phase = Phase::Plan;
         Ok(())
+    }
+
+    /// Releases the group for a program; why not, is reported.
+    pub fn press(&mut self, group: &mut Group<N>) {
+        if let Err(why) = self.run(group) {
+            group.report(GroupEvent::ReleaseRefused(why));
+        }
     }
 
     /// All of it, for whoever has the group for himself.
@@ -300,7 +330,8 @@ impl<const N: usize> Director<N> {
             }
         };
         (self.phase, self.until) = (Phase::Ordered, count);
-        if let Err(why) = group.order(order) {
+        let mut why = Refusal::NONE;
+        if group.accept(order, &mut why).is_err() {
             self.end();
             group.report(GroupEvent::ReleaseRefused(why));
         }
@@ -354,12 +385,10 @@ impl<const N: usize> Director<N> {
         };
     }
 
-    /// Takes note of what went wrong.
-    #[inline(never)]
-    fn judge(&mut self, result: Result<bool, Refusal>) -> bool {
-        result.unwrap_or_else(|error| {
+    /// Takes note of whether something went wrong.
+    fn judge(&mut self, result: Result<bool, Refused>) -> bool {
+        result.unwrap_or_else(|Refused| {
             self.phase = Phase::Failed;
-            self.error = Some(error);
             false
         })
     }
@@ -367,17 +396,16 @@ impl<const N: usize> Director<N> {
     /// After that: a program ends; a move that cannot be made leaves everything as
     /// it is.
     fn give_up(&mut self, group: &mut Group<N>) {
-        if let Some(mut error) = self.error {
-            error.step = self.step();
-            if self.running {
-                // The group moves: a stop is never refused.
-                let _ = group.order(Order::Stop);
-            }
-            group.report(match self.running {
-                true => GroupEvent::ProgramFailed(error),
-                false => GroupEvent::MoveRefused(error),
-            });
-        }
+        let mut error = self.error;
+        error.step = self.step();
+        let event = if self.running {
+            // The group moves: a stop is never refused.
+            let _ = group.order(Order::Stop);
+            GroupEvent::ProgramFailed(error)
+        } else {
+            GroupEvent::MoveRefused(error)
+        };
+        group.report(event);
         self.end();
     }
 }

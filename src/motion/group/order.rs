@@ -4,6 +4,7 @@ use super::axis::{FRESH, SLOW};
 use super::{Group, Inputs, bit};
 use crate::motion::contract::{Cell, Event, cell};
 use crate::motion::mode::Mode;
+use crate::motion::program::{Judged, Refused};
 use crate::motion::{GroupEvent, GroupState, Reason, Refusal, next};
 
 /// What the group is told to do.
@@ -58,14 +59,19 @@ impl Order {
     }
 }
 
-const NOT_READY: Refusal = Refusal::whole(Reason::Network, 0, 1);
-
 impl<const N: usize> Group<N> {
     /// Takes an order for the next step. A stop replaces what was ordered before.
     ///
     /// # Errors
     /// [`Refusal`]: nothing is done.
     pub fn order(&mut self, order: Order) -> Result<(), Refusal> {
+        let mut why = Refusal::NONE;
+        self.accept(order, &mut why).map_err(|Refused| why)
+    }
+
+    /// The same.
+    #[inline(never)]
+    pub(in crate::motion) fn accept(&mut self, order: Order, why: &mut Refusal) -> Judged {
         let Some(event) = order.event() else {
             self.unwanted = false;
             return Ok(());
@@ -75,15 +81,15 @@ impl<const N: usize> Group<N> {
             return Ok(());
         }
         if cell(self.state, event) == Cell::Refuse {
-            return Err(Refusal::not_in(self.state));
+            return why.state(self.state);
         }
         match order {
             Order::Finish if self.state != GroupState::Moving || !self.all_arrived() => {
-                return Err(Refusal::BUSY);
+                return why.busy();
             }
             Order::Stop | Order::QuickStop => {}
-            _ if self.ordered.event().is_some() => return Err(Refusal::BUSY),
-            _ => self.permit(order)?,
+            _ if self.ordered.event().is_some() => return why.busy(),
+            _ => self.permit(order, why)?,
         }
         self.unwanted |= event == Event::QuickStop;
         self.ordered = order;
@@ -91,13 +97,13 @@ impl<const N: usize> Group<N> {
     }
 
     /// Whether all axes can do what is ordered.
-    fn permit(&self, order: Order) -> Result<(), Refusal> {
+    fn permit(&self, order: Order, why: &mut Refusal) -> Judged {
         let Some(config) = self.config else {
-            return Err(NOT_READY);
+            return Ok(());
         };
         let mut look = self.here();
         let (wanted, other) = match order {
-            Order::Reset if !self.network_ready => return Err(NOT_READY),
+            Order::Reset if !self.network_ready => return why.because(Reason::Network, 0, 1),
             Order::Release => (0, Mode::Homing),
             Order::SetMode { axes, mode } => (axes, mode),
             Order::Home { axes, .. } => {
@@ -125,7 +131,8 @@ impl<const N: usize> Group<N> {
             } else {
                 continue;
             };
-            return Err(Refusal::of(n as u8, reason, value, allowed));
+            why.axis = n as u8;
+            return why.because(reason, value, allowed);
         }
         Ok(())
     }
