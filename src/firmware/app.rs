@@ -43,10 +43,7 @@ mod app {
         design,
         id::{CobId, FunctionCode},
         master::{AxisMap, Debounce, ExtendedClock, MasterOd, Supervisor},
-        motion::{
-            AxisCommand, Director, Group,
-            panel::{PROGRAM_BYTES, Panel},
-        },
+        motion::{AxisCommand, Director, panel::Panel},
         network::Network,
         nmt,
         sync::SyncCounter,
@@ -135,11 +132,9 @@ mod app {
     /// Sets up the board and hands each task its part. Runs with interrupts off,
     /// before anything can be late.
     #[init(local = [
-        group: Group<AXES> = Group::ZERO,
+        axes: Axes = Axes::ZERO,
         planning: Director<AXES> = Director::ZERO,
-        axes_place: MaybeUninit<Axes> = MaybeUninit::uninit(),
-        panel_place: MaybeUninit<Panel<AXES>> = MaybeUninit::uninit(),
-        program: [u8; PROGRAM_BYTES] = [0; PROGRAM_BYTES],
+        panel: Panel<AXES> = Panel::new(),
         boot_place: MaybeUninit<NetworkBoot<AXES>> = MaybeUninit::uninit(),
         own_place: MaybeUninit<OwnNode> = MaybeUninit::uninit(),
         line_places: [Line; BUSES] = [const { Line::new() }; BUSES],
@@ -186,7 +181,7 @@ mod app {
                 phase: board.phase,
                 clock_us: board.microseconds,
                 commands: [AxisCommand::default(); AXES],
-                axes: new_axes(cx.local.group, cx.local.axes_place),
+                axes: configured_axes(cx.local.axes),
                 counts: Counts::default(),
             },
             Local {
@@ -218,7 +213,7 @@ mod app {
                     clock: board.microseconds,
                     boot,
                     director: configured(cx.local.planning),
-                    panel: new_panel(cx.local.panel_place, cx.local.program),
+                    panel: cx.local.panel,
                     answers,
                     transfer_answers,
                     states,
@@ -232,15 +227,9 @@ mod app {
         )
     }
 
-    /// Makes the largest values where they are to stay. Not in `init` itself: what
-    /// stands in its frame lies below every interrupt's for ever.
-    #[inline(never)]
-    fn new_axes(
-        group: &'static mut Group<AXES>,
-        axes: &'static mut MaybeUninit<Axes>,
-    ) -> &'static mut Axes {
-        group.configure(&derived::GROUP);
-        axes.write(Axes::new(group))
+    fn configured_axes(axes: &'static mut Axes) -> &'static mut Axes {
+        axes.group.configure(&derived::GROUP);
+        axes
     }
 
     fn configured(director: &'static mut Director<AXES>) -> &'static mut Director<AXES> {
@@ -248,13 +237,8 @@ mod app {
         director
     }
 
-    #[inline(never)]
-    fn new_panel(
-        place: &'static mut MaybeUninit<Panel<AXES>>,
-        program: &'static mut [u8],
-    ) -> &'static mut Panel<AXES> {
-        place.write(Panel::new(&derived::GROUP, program))
-    }
+    // The largest values are made where they are to stay. Not in `init` itself: what
+    // stands in its frame lies below every interrupt's for ever.
 
     #[inline(never)]
     fn new_boot(

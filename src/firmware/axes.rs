@@ -19,13 +19,13 @@ const ALL_AXES: usize = usize::MAX;
 /// The group with what surrounds it.
 #[expect(unreachable_pub, reason = "RTIC wants shared resources to be public")]
 pub struct Axes {
-    pub(crate) group: &'static mut Group<AXES>,
+    pub(crate) group: Group<AXES>,
     /// The button was pressed while nothing moved: `sdo_configurator` runs the
     /// program.
     pub(crate) pressed: bool,
     feedback: [AxisFeedback; AXES],
     ramps: Ramps<AXES>,
-    overload: Overload,
+    overload: Overload<{ design::LATE_CYCLES_MAX }>,
     /// RPDOs of the last cycle did not get out.
     unsent: bool,
     /// For the axes whose TPDOs carry no velocity.
@@ -33,17 +33,16 @@ pub struct Axes {
 }
 
 impl Axes {
-    pub(crate) fn new(group: &'static mut Group<AXES>) -> Axes {
-        Axes {
-            group,
-            pressed: false,
-            feedback: [AxisFeedback::default(); AXES],
-            ramps: Ramps::new(),
-            overload: Overload::new(design::LATE_CYCLES_MAX),
-            unsent: false,
-            speed: [Speedometer::new(); AXES],
-        }
-    }
+    /// All of it is 0 until the group is configured.
+    pub(crate) const ZERO: Axes = Axes {
+        group: Group::ZERO,
+        pressed: false,
+        feedback: [AxisFeedback::NONE; AXES],
+        ramps: Ramps::new(),
+        overload: Overload::new(),
+        unsent: false,
+        speed: [Speedometer::new(); AXES],
+    };
 
     /// Takes in the TPDOs of a cycle.
     pub(crate) fn read(&mut self, cycle: &Cycle, od: &mut impl Mutex<T = MasterOd<AXES>>) {

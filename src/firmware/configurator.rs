@@ -150,18 +150,18 @@ impl<'a> Configurator<'a> {
         let panel = &mut *self.local.panel;
         let plan = self.shared.axes.lock(|axes| {
             if core::mem::take(&mut axes.pressed) {
-                director.press(axes.group);
+                director.press(&mut axes.group);
             }
-            panel.poll(axes.group);
+            panel.poll(&mut axes.group);
             let program = panel.program().unwrap_or(PROGRAM.as_slice());
-            director.look(axes.group, program)
+            director.look(&mut axes.group, program)
         });
         let program = panel.program().unwrap_or(PROGRAM.as_slice());
         if plan {
             director.think(program);
             self.shared
                 .axes
-                .lock(|axes| director.act(axes.group, program));
+                .lock(|axes| director.act(&mut axes.group, program));
         }
     }
 

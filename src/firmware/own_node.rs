@@ -106,7 +106,7 @@ where
             return Ok(measured::entry(at.sub.0));
         }
         let (panel, director) = (&*self.panel, &*self.director);
-        Ok(self.axes.lock(|axes| panel.get(at, axes.group, director)))
+        Ok(self.axes.lock(|axes| panel.get(at, &axes.group, director)))
     }
 
     fn set_number(&mut self, at: Address, value: u32) -> Result<(), AbortCode> {
@@ -116,7 +116,7 @@ where
         }
         let (panel, director) = (&mut *self.panel, &mut *self.director);
         self.axes
-            .lock(|axes| panel.set(at, value, axes.group, director))
+            .lock(|axes| panel.set(at, value, &mut axes.group, director))
     }
 
     fn read(&mut self, _: Address, offset: u32, buf: &mut [u8]) -> Result<Chunk, AbortCode> {

@@ -2,17 +2,17 @@
 //! group.
 
 /// Counts late cycles in a row.
-#[derive(Debug)]
-pub struct Overload {
-    /// So many are tolerated.
-    max: u8,
+///
+/// `MAX` in a row are tolerated.
+#[derive(Debug, Default)]
+pub struct Overload<const MAX: u8> {
     late: u8,
 }
 
-impl Overload {
-    /// None was late yet. `max` in a row are tolerated.
-    pub const fn new(max: u8) -> Overload {
-        Overload { max, late: 0 }
+impl<const MAX: u8> Overload<MAX> {
+    /// None was late yet.
+    pub const fn new() -> Overload<MAX> {
+        Overload { late: 0 }
     }
 
     /// A cycle is taken up, the `passed`-th after the one before: more than one if
@@ -27,7 +27,7 @@ impl Overload {
         }
         let before = self.late;
         self.late = before.saturating_add(u8::try_from(more).unwrap_or(u8::MAX));
-        (before <= self.max && self.late > self.max).then_some(self.late)
+        (before <= MAX && self.late > MAX).then_some(self.late)
     }
 }
 
@@ -37,13 +37,13 @@ mod tests {
 
     #[test]
     fn cycles_in_time_are_no_news() {
-        let mut overload = Overload::new(2);
+        let mut overload = Overload::<2>::new();
         assert!((0..100).all(|_| overload.cycle(1, false).is_none()));
     }
 
     #[test]
     fn one_now_and_then_is_tolerated() {
-        let mut overload = Overload::new(2);
+        let mut overload = Overload::<2>::new();
         for n in 0..100 {
             assert_eq!(overload.cycle(1, n % 3 != 0), None);
             assert_eq!(overload.cycle(1 + n % 2, false), None);
@@ -53,7 +53,7 @@ mod tests {
 
     #[test]
     fn several_in_a_row_are_told_once() {
-        let mut overload = Overload::new(2);
+        let mut overload = Overload::<2>::new();
         assert_eq!(overload.cycle(1, true), None);
         assert_eq!(overload.cycle(2, false), None);
         assert_eq!(overload.cycle(1, true), Some(3));
@@ -64,7 +64,7 @@ mod tests {
 
     #[test]
     fn a_long_pause_does_not_overflow() {
-        let mut overload = Overload::new(2);
+        let mut overload = Overload::<2>::new();
         assert_eq!(overload.cycle(u32::MAX, true), Some(u8::MAX));
         assert_eq!(overload.cycle(u32::MAX, true), None);
     }

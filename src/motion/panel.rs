@@ -12,8 +12,7 @@
 use super::mode::Mode;
 use super::program::{Judged, Refused};
 use super::{
-    AxisMove, Director, FaultCause, Group, GroupConfig, GroupEvent, GroupState, Order, Reason,
-    Refusal,
+    AxisMove, Director, FaultCause, Group, GroupEvent, GroupState, Order, Reason, Refusal,
 };
 use crate::id::Address;
 use crate::od::Part;
@@ -62,23 +61,27 @@ const HOMING: Duration = Duration::from_millis(60_000);
 
 /// What clients have set, and what they are told: of refusals (2002h) the
 /// [`Reason`] and, as detail, the value, or the step of a program.
+///
+/// Until something is set all of it is 0, so that it needs no room in an image.
 #[derive(Debug)]
+#[repr(C)]
 pub struct Panel<const N: usize> {
-    config: &'static GroupConfig<N>,
     command: u8,
-    refusal: u32,
-    axes: u32,
-    jerk: u32,
-    moves: [AxisMove; N],
-    modes: [Mode; N],
-    faults: [u32; N],
-    /// Axes whose mode is to be ordered as soon as the group stands by.
-    changing: u32,
-    program: &'static mut [u8],
-    /// Bytes of the program that was taken; 0: none was.
-    length: usize,
     /// A program is being written.
     loading: bool,
+    refusal: u32,
+    /// Axes that the command is not for.
+    left_out: u32,
+    jerk: u32,
+    /// Axes whose mode is to be ordered as soon as the group stands by.
+    changing: u32,
+    /// Bytes of the program that was taken; 0: none was.
+    length: usize,
+    /// None: profile velocity.
+    modes: [Option<Mode>; N],
+    faults: [u32; N],
+    moves: [AxisMove; N],
+    program: [u8; PROGRAM_BYTES],
 }
 
 /// No part in a move.
@@ -90,22 +93,27 @@ const AT_REST: AxisMove = AxisMove {
     set: 0,
 };
 
+impl<const N: usize> Default for Panel<N> {
+    fn default() -> Panel<N> {
+        Panel::new()
+    }
+}
+
 impl<const N: usize> Panel<N> {
-    /// All axes, no program; `program` is room for one.
-    pub fn new(config: &'static GroupConfig<N>, program: &'static mut [u8]) -> Panel<N> {
+    /// All axes, no program.
+    pub const fn new() -> Panel<N> {
         Panel {
-            config,
             command: 0,
-            refusal: 0,
-            axes: Self::ALL,
-            jerk: 0,
-            moves: [AT_REST; N],
-            modes: [Mode::ProfileVelocity; N],
-            faults: [0; N],
-            changing: 0,
-            program,
-            length: 0,
             loading: false,
+            refusal: 0,
+            left_out: 0,
+            jerk: 0,
+            changing: 0,
+            length: 0,
+            modes: [None; N],
+            faults: [0; N],
+            moves: [AT_REST; N],
+            program: [0; PROGRAM_BYTES],
         }
     }
 
@@ -125,7 +133,7 @@ impl<const N: usize> Panel<N> {
             COMMAND => self.command.into(),
             STATE => group.state() as u32,
             REFUSAL => self.refusal,
-            AXES => self.axes,
+            AXES => Self::ALL & !self.left_out,
             JERK => self.jerk,
             STEP => director.step().into(),
             index => self.of_axis(index, usize::from(at.sub.0).wrapping_sub(1), group),
@@ -185,11 +193,11 @@ impl<const N: usize> Panel<N> {
                 if value & !Self::ALL != 0 {
                     return why.because(Reason::Unknown, value, Self::ALL);
                 }
-                self.axes = value;
+                self.left_out = !value;
             }
             JERK => self.jerk = value,
             index => {
-                let of = (self.moves.get_mut(axis), self.config.axes.get(axis));
+                let of = (self.moves.get_mut(axis), director.limits().get(axis));
                 let (Some(part), Some(limits)) = of else {
                     return Ok(());
                 };
@@ -204,7 +212,7 @@ impl<const N: usize> Panel<N> {
                             let code = u32::from(value as u8);
                             return why.because(Reason::NoSuchMode, code, limits.modes);
                         };
-                        *place = mode;
+                        *place = Some(mode);
                     }
                 }
             }
@@ -220,7 +228,7 @@ impl<const N: usize> Panel<N> {
         why: &mut Refusal,
     ) -> Judged {
         const LAST: u32 = 12;
-        let (axes, state) = (self.axes, group.state());
+        let (axes, state) = (Self::ALL & !self.left_out, group.state());
         let order = match command {
             0 => return Ok(()),
             1 => Order::Enable,
@@ -232,7 +240,7 @@ impl<const N: usize> Panel<N> {
             7 => Order::Reset,
             8 => Order::Home {
                 axes,
-                limit: self.config.cycles(HOMING),
+                limit: director.cycles(HOMING),
             },
             9 if state == GroupState::Standby => {
                 self.changing = axes;
@@ -253,12 +261,13 @@ impl<const N: usize> Panel<N> {
     /// kind after the other.
     fn change_modes(&mut self, group: &mut Group<N>, why: &mut Refusal) -> Judged {
         let first = self.changing.trailing_zeros() as usize;
-        let Some(&mode) = self.modes.get(first) else {
+        let Some(&wanted) = self.modes.get(first) else {
             return Ok(());
         };
+        let mode = wanted.unwrap_or_default();
         let mut axes = 0;
         for (n, other) in self.modes.iter().enumerate() {
-            if *other == mode {
+            if *other == wanted {
                 axes |= self.changing & 1 << n;
             }
         }
@@ -337,7 +346,7 @@ impl<const N: usize> Panel<N> {
             self.loading = false;
             let bytes = self.program.get(..to).unwrap_or_default();
             let mut why = Refusal::NONE;
-            let checked = super::format::inspect(bytes, self.config, &mut why);
+            let checked = director.inspect(bytes, &mut why);
             self.note(checked, &why)?;
             self.length = to;
         }

@@ -144,6 +144,27 @@ impl Path {
         self.straight_on();
     }
 
+    /// Forgets everything: comes to rest from `velocity`, in increments per cycle, in
+    /// so many cycles.
+    #[inline(never)]
+    pub(super) fn brake(&mut self, position: i64, velocity: f32, cycles: u32) {
+        self.len = 0;
+        self.next = 0;
+        let first = fixed::fixed(velocity);
+        let way = (first >> 1).wrapping_mul(i64::from(cycles));
+        self.position = position;
+        self.to = Knot {
+            cycles,
+            position: position.wrapping_add(way),
+            velocity: 0,
+        };
+        self.acceleration = -velocity / cycles as f32;
+        self.jerk = 0.0;
+        self.second = fixed::fine(self.acceleration);
+        self.third = 0;
+        self.first = first + (self.second >> (MORE + 1));
+    }
+
     /// As at a knot.
     fn stand_at(&mut self, position: i64, velocity: i64) {
         self.position = position;

@@ -1,7 +1,6 @@
 //! Objects 2000h to 2010h: what a client can do with the group, and what it is told.
 
 use canmaster::id::Address;
-use canmaster::motion::experiment::GROUP;
 use canmaster::motion::panel::{self, PROGRAM_BYTES, Panel};
 use canmaster::motion::{Cause, GroupEvent, GroupState, Inputs};
 use canmaster::od::Part;
@@ -19,7 +18,7 @@ impl Desk {
     fn new() -> Desk {
         Desk {
             rig: Rig::standby(1),
-            panel: Panel::new(&GROUP, Box::leak(Box::new([0; PROGRAM_BYTES]))),
+            panel: Panel::new(),
         }
     }
 

@@ -90,12 +90,17 @@ impl<'a> Step<'a> {
         self.flags & flag != 0
     }
 
-    const fn members(&self) -> usize {
-        self.axes.count_ones() as usize
+    #[inline(never)]
+    fn members(&self) -> usize {
+        let (mut left, mut members) = (self.axes, 0);
+        while next(&mut left).is_some() {
+            members += 1;
+        }
+        members
     }
 
     /// Bytes of a point of a path, all its shapes included.
-    const fn point_len(&self) -> usize {
+    fn point_len(&self) -> usize {
         let shapes = if self.has(SHARED) { 1 } else { self.members() };
         POINT + shapes * SHAPE
     }
@@ -111,7 +116,7 @@ impl<'a> Step<'a> {
     }
 
     /// All of its bytes.
-    pub(super) const fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         STEP + match self.kind {
             MOVE => self.members() * MOVE_PART,
             PATH => self.members() * PATH_PART + self.points() * self.point_len(),

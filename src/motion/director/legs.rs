@@ -1,7 +1,7 @@
 //! From the steps of a program and from single moves to the paths of the group.
 
 use super::format::{RELATIVE, Step};
-use super::{Director, LATER_MAX, LEAD, Phase, format, limits};
+use super::{Director, LATER_MAX, LEAD, Phase, format};
 use crate::motion::group::{Group, SetPoint};
 use crate::motion::mode::Mode;
 use crate::motion::program::{AxisMove, Judged, Reason, Refusal, Refused};
@@ -39,16 +39,16 @@ impl<const N: usize> Director<N> {
         relative: bool,
         jerk: u32,
     ) -> Judged {
-        let why = &mut self.error;
-        *why = Refusal::NONE;
-        why.axis = axis as u8;
         let (Some(limits), Some(of), Some(leg)) = (
-            limits(self.config).get(axis),
+            self.limits().get(axis),
             group.axis(axis),
             self.legs.get_mut(axis),
         ) else {
             return Ok(());
         };
+        let why = &mut self.error;
+        *why = Refusal::NONE;
+        why.axis = axis as u8;
         let torque = of.mode() == Mode::CyclicTorque;
         let (home, scale) = if torque {
             (0, limits.scale.of_units())
@@ -124,6 +124,7 @@ impl<const N: usize> Director<N> {
     }
 
     fn plan(&mut self, step: &Step<'_>) -> Result<bool, Refused> {
+        let limits = self.limits();
         let why = &mut self.error;
         if !self.path
             && let Err(axis) = plan::plan(&mut self.legs)
@@ -132,7 +133,7 @@ impl<const N: usize> Director<N> {
             why.because(Reason::Time, u32::MAX, plan::CYCLES_MAX)?;
         }
         let mut member = 0;
-        let all = self.legs.iter_mut().zip(limits(self.config));
+        let all = self.legs.iter_mut().zip(limits);
         for (axis, (leg, limits)) in (0..).zip(all) {
             why.axis = axis;
             let from = fixed::round(leg.from.position).wrapping_sub(leg.home);

@@ -13,6 +13,7 @@ use super::mode::Mode;
 use super::plan::Leg;
 use super::program::{Judged, Refusal, Refused};
 use super::{AxisConfig, AxisMove, GroupConfig, GroupEvent, GroupState};
+use crate::time::Duration;
 use heapless::Vec;
 
 /// Cycles from the look at the group to the first step of the plan; doubled when
@@ -118,6 +119,24 @@ impl<const N: usize> Director<N> {
     /// Makes the same of [`Director::ZERO`], where it is to stay.
     pub const fn configure(&mut self, config: &'static GroupConfig<N>) {
         self.config = Some(config);
+    }
+
+    /// The axes' limits and units.
+    pub(super) fn limits(&self) -> &'static [AxisConfig] {
+        self.config.map_or(&[], |config| &config.axes)
+    }
+
+    /// Whole cycles that last at least `time`.
+    pub(super) fn cycles(&self, time: Duration) -> u32 {
+        self.config.map_or(0, |config| config.cycles(time))
+    }
+
+    /// Reads all of a program against the limits of the axes.
+    pub(super) fn inspect(&self, program: &[u8], why: &mut Refusal) -> Judged {
+        match self.config {
+            Some(config) => format::inspect(program, config, why),
+            None => why.busy(),
+        }
     }
 
     /// The step of the program that runs, counted from 1; 0: none.
@@ -408,9 +427,4 @@ impl<const N: usize> Director<N> {
         group.report(event);
         self.end();
     }
-}
-
-/// The axes' limits and units.
-fn limits<const N: usize>(config: Option<&'static GroupConfig<N>>) -> &'static [AxisConfig] {
-    config.map_or(&[], |config| &config.axes)
 }

@@ -5,7 +5,7 @@ use super::drive_led::DriveLed;
 use crate::cia402::{self, State, StatusWord};
 use crate::motion::fixed;
 use crate::motion::mode::Mode;
-use crate::motion::path::{Knot, Path, Point, Sample};
+use crate::motion::path::{Path, Point, Sample};
 use crate::motion::position_control::{PositionControl, Tuning, Window};
 use crate::motion::{AxisConfig, AxisFeedback, GroupConfig};
 
@@ -115,13 +115,7 @@ pub(in crate::motion) struct Axis {
 
 impl Axis {
     pub(super) const ZERO: Axis = Axis {
-        feedback: AxisFeedback {
-            statusword: 0,
-            position: 0,
-            velocity: 0,
-            torque: 0,
-            fresh: false,
-        },
+        feedback: AxisFeedback::NONE,
         machine: cia402::Axis::new(),
         seen: 0,
         mode: None,
@@ -316,30 +310,17 @@ impl Axis {
     #[inline(never)]
     pub(super) fn stop(&mut self, cycles: u32, speed: f32, config: &AxisConfig) -> f32 {
         self.over = 0;
-        let from = *self.sample(NEXT);
-        let mut at = Point {
-            position: from.position,
-            ..Point::default()
-        };
-        let mut end = Knot {
-            cycles,
-            ..Knot::default()
-        };
-        let mut slope = 0.0;
+        let position = self.sample(NEXT).position;
+        let mut velocity = config.scale.velocity(speed);
         if self.mode() == Mode::CyclicTorque {
-            at.velocity = fixed::fixed(from.velocity);
-        } else {
-            let speed = config.scale.velocity(speed);
-            at.velocity = fixed::fixed(speed);
-            let way = (at.velocity >> 1).wrapping_mul(i64::from(cycles));
-            end.position = at.position.wrapping_add(way);
-            slope = speed.abs() / cycles as f32;
+            // So that it ends at 0.
+            const TWICE: f32 = -2.0;
+            velocity = TWICE * fixed::float(position) / cycles as f32;
         }
-        self.path.restart(&at);
-        self.path.push(&end, false);
+        self.path.brake(position, velocity, cycles);
         self.look(END);
         self.look(AHEAD);
-        slope
+        velocity.abs() / cycles as f32
     }
 
     /// How long it has waited to come to rest since its path ended, in cycles.

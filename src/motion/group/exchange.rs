@@ -21,6 +21,17 @@ pub struct AxisFeedback {
     pub fresh: bool,
 }
 
+impl AxisFeedback {
+    /// Before it reported anything.
+    pub const NONE: AxisFeedback = AxisFeedback {
+        statusword: 0,
+        position: 0,
+        velocity: 0,
+        torque: 0,
+        fresh: false,
+    };
+}
+
 /// What a drive is told for the next cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
