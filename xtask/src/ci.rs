@@ -130,6 +130,7 @@ fn one_run() -> Result<()> {
         fault: Vec::new(),
         realtime: false,
         bridge: None,
+        unattended: false,
         log: LogLevel::Info,
         picture: None,
         json: false,
