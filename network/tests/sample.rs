@@ -66,6 +66,7 @@ fn the_generated_network_is_the_one_of_the_library() {
     assert_eq!((generated::COMPUTE_US, generated::RPDOS_US), (120, 710));
     // The master's heartbeat each 50 ms and ramps in every 16th cycle share a slot.
     assert_eq!(generated::LONGEST_CYCLE_US, 46_874);
+    const { assert!(generated::PDOS_ALIKE) };
 }
 
 /// SDO and ramps share a slot directly after SYNC, and no heartbeat is in operational.

@@ -2,7 +2,7 @@
 
 use crate::{
     control::Control,
-    derived::{AXES, AXIS_BUSES, GROUP, NETWORK, PDOS, RAMPS_ON_CHANGE, RPDOS_AFTER_SYNC},
+    derived::{self, AXES, AXIS_BUSES, GROUP, NETWORK, RAMPS_ON_CHANGE, RPDOS_AFTER_SYNC},
     lines::Lines,
 };
 use canmaster::{
@@ -47,10 +47,12 @@ impl Axes {
     /// Takes in the TPDOs of a cycle.
     pub(crate) fn read(&mut self, cycle: &Cycle, od: &mut impl Mutex<T = MasterOd<AXES>>) {
         let axes = self.feedback.iter_mut().zip(&mut self.speed);
-        let axes = axes.zip(&PDOS).zip(&GROUP.axes);
-        for (axis, (((feedback, speed), pdos), limits)) in axes.enumerate() {
-            let (Some(first), Some(second)) = (TpdoSlot::new(axis, 0), TpdoSlot::new(axis, 1))
-            else {
+        for (axis, ((feedback, speed), limits)) in axes.zip(&GROUP.axes).enumerate() {
+            let (Some(first), Some(second), Some(pdos)) = (
+                TpdoSlot::new(axis, 0),
+                TpdoSlot::new(axis, 1),
+                derived::pdos(axis),
+            ) else {
                 continue;
             };
             let fresh = !cycle.missing.contains(first) && !cycle.missing.contains(second);
@@ -132,8 +134,10 @@ impl Axes {
             }
         });
         let due = self.ramps.due(commands);
-        let nodes = NETWORK.nodes.iter().zip(&PDOS);
-        for (axis, ((node, pdos), command)) in nodes.zip(commands).enumerate() {
+        for (axis, (node, command)) in NETWORK.nodes.iter().zip(commands).enumerate() {
+            let Some(pdos) = derived::pdos(axis) else {
+                continue;
+            };
             let on_change = RAMPS_ON_CHANGE.get(axis).is_some_and(|on| *on);
             let ramps = match on_change && due != Some(axis) {
                 true => None,

@@ -119,13 +119,32 @@ pub(crate) const fn bit_timing(peripheral: u8) -> BitTiming {
 }
 
 /// Where in its PDOs each object of each axis lies.
-pub(crate) static PDOS: [AxisPdos; AXES] = match AxisPdos::of_all(&NETWORK) {
+const ALL_PDOS: [AxisPdos; AXES] = match AxisPdos::of_all(&NETWORK) {
     Some(pdos) => pdos,
     None => panic!("an object is not mapped that an axis cannot be led without"),
 };
 
+const KINDS: usize = if generated::PDOS_ALIKE { 1 } else { AXES };
+
+/// Once where all are alike, else of each axis.
+static PDOS: [AxisPdos; KINDS] = {
+    let mut pdos = [ALL_PDOS[0]; KINDS];
+    let mut n = 0;
+    while n < KINDS {
+        pdos[n] = ALL_PDOS[n];
+        n += 1;
+    }
+    pdos
+};
+
+/// Where in its PDOs each object of an axis lies.
+#[inline(always)]
+pub(crate) fn pdos(axis: usize) -> Option<&'static AxisPdos> {
+    PDOS.get(if generated::PDOS_ALIKE { 0 } else { axis })
+}
+
 /// Bytes of the TPDOs of each axis.
-pub(crate) static TPDO_BYTES: [[u8; TPDOS_PER_AXIS]; AXES] = AxisPdos::tpdo_bytes(&PDOS);
+pub(crate) static TPDO_BYTES: [[u8; TPDOS_PER_AXIS]; AXES] = AxisPdos::tpdo_bytes(&ALL_PDOS);
 
 /// What the firmware takes for 1006h and 1007h: the periods that pass the check of
 /// the description, and a window that holds the deadline of the TPDOs, the steps of

@@ -12,7 +12,7 @@ use crate::{
     axes::Axes,
     control::Control,
     counters::Counts,
-    derived::{AXES, PDOS, PROGRAM, SYNC_LIMITS, TPDO_EVERY},
+    derived::{self, AXES, PROGRAM, SYNC_LIMITS, TPDO_EVERY},
     log::News,
     measured,
 };
@@ -144,7 +144,7 @@ where
     fn rpdo(&mut self, node: NodeId, number: u8) -> [u8; 8] {
         let data = self.network.find(node).and_then(|(axis, _)| {
             let command = self.commands.lock(|commands| commands.get(axis).copied())?;
-            Some(PDOS.get(axis)?.rpdo(number, &command))
+            Some(derived::pdos(axis)?.rpdo(number, &command))
         });
         data.unwrap_or_default()
     }

@@ -72,6 +72,13 @@ fn write(machine: &Machine, library: &str, out: &mut String) -> std::fmt::Result
     let rpdos = layouts().map(|layout| layout.after_tpdos_us() - layout.demand.compute_us);
     let rpdos = rpdos.max().unwrap_or(0);
     writeln!(out, "pub const RPDOS_US: u16 = {rpdos};")?;
+    writeln!(
+        out,
+        "/// Whether all nodes have the same PDOs, mapped alike."
+    )?;
+    let pdos = || machine.nodes.iter().map(|node| (&node.rpdos, &node.tpdos));
+    let alike = pdos().zip(pdos().skip(1)).all(|(one, next)| one == next);
+    writeln!(out, "pub const PDOS_ALIKE: bool = {alike};")?;
     super::cycle::cycle(machine, out)?;
     out.push('\n');
     motors(machine, out)?;

@@ -18,6 +18,8 @@ pub const LONGEST_CYCLE_US: u32 = 46874;
 pub const COMPUTE_US: u16 = 120;
 /// From the first RPDO of a cycle to the end of the last and the guard, us.
 pub const RPDOS_US: u16 = 710;
+/// Whether all nodes have the same PDOs, mapped alike.
+pub const PDOS_ALIKE: bool = true;
 /// Buses, in the order of their names.
 pub const BUSES: usize = 1;
 /// The controller of each: 1 for FDCAN1.
