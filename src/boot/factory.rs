@@ -146,7 +146,7 @@ impl Factory {
                 None if place == nodes.len() && part != Part::Serial => nodes.first(),
                 node => node,
             };
-            like?.identity.number(part.position() + 1)
+            like?.number(part.position() + 1)
         };
         let ok = result.is_some_and(ConfigurationResult::is_ok);
         let event = match (self.step, node) {

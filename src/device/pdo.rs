@@ -154,7 +154,7 @@ fn fields(pdos: &[Pdo]) -> usize {
 
 const fn pdos(node: &Node, direction: Direction) -> &'static [Pdo] {
     match direction {
-        Direction::Receive => node.rpdos,
-        Direction::Transmit => node.tpdos,
+        Direction::Receive => node.kind.rpdos,
+        Direction::Transmit => node.kind.tpdos,
     }
 }

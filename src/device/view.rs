@@ -115,14 +115,7 @@ impl<'a, B: Board, const N: usize> View<'a, B, N> {
             }
             Item::NmtRequest => record.map_or(0, |record| record.presence.0).into(),
             Item::Expected => {
-                let identity = known.map(|(node, _)| &node.identity);
-                let expected = identity.and_then(|identity| match found.place {
-                    0 => identity.device_type,
-                    1 => identity.vendor,
-                    2 => identity.product,
-                    3 => identity.revision,
-                    _ => identity.serial,
-                });
+                let expected = known.and_then(|(node, _)| node.number(found.place as u8));
                 expected.unwrap_or(0)
             }
             Item::ConfiguredAt => known

@@ -212,28 +212,29 @@ impl AxisPdos {
     /// The PDOs as `node` has them mapped. `None` if an object is missing that an
     /// axis cannot be led without in profile velocity mode, in which it starts.
     pub const fn of(node: &Node) -> Option<AxisPdos> {
+        let kind = node.kind;
         let (Some(velocity), Some(ramps), Some(statusword), Some(position)) = (
-            Rpdo::find(node.rpdos, CONTROLWORD, TARGET_VELOCITY),
-            Rpdo::find(node.rpdos, ACCELERATION, DECELERATION),
-            Place::find(node.tpdos, STATUSWORD),
-            Place::find(node.tpdos, POSITION),
+            Rpdo::find(kind.rpdos, CONTROLWORD, TARGET_VELOCITY),
+            Rpdo::find(kind.rpdos, ACCELERATION, DECELERATION),
+            Place::find(kind.tpdos, STATUSWORD),
+            Place::find(kind.tpdos, POSITION),
         ) else {
             return None;
         };
         Some(AxisPdos {
             targets: [
                 Some(velocity),
-                Rpdo::find(node.rpdos, CONTROLWORD, TARGET_POSITION),
-                Rpdo::find(node.rpdos, CONTROLWORD, TARGET_TORQUE),
+                Rpdo::find(kind.rpdos, CONTROLWORD, TARGET_POSITION),
+                Rpdo::find(kind.rpdos, CONTROLWORD, TARGET_TORQUE),
             ],
             ramps: Some(ramps),
             feedback: [
                 statusword,
                 position,
-                Place::find_or_nowhere(node.tpdos, VELOCITY),
-                Place::find_or_nowhere(node.tpdos, TORQUE),
+                Place::find_or_nowhere(kind.tpdos, VELOCITY),
+                Place::find_or_nowhere(kind.tpdos, TORQUE),
             ],
-            tpdo_bytes: lengths(node.tpdos),
+            tpdo_bytes: lengths(kind.tpdos),
         })
     }
 
@@ -341,7 +342,9 @@ impl AxisPdos {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::network::Kind;
     use crate::network::sample::SIX_EPOS4_10_MS as SIX_EPOS4;
+    use std::boxed::Box;
 
     const PDOS: usize = TPDOS_PER_AXIS;
 
@@ -453,23 +456,28 @@ mod tests {
             pdo(1, &[OTHER, VELOCITY]),
             pdo(2, &[POSITION, OTHER, STATUSWORD]),
         ];
-        let node = Node {
-            rpdos: RPDOS,
-            tpdos: TPDOS,
-            ..crate::network::sample::epos4(NodeId::constant::<7>(), "axis 7")
+        let id = NodeId::constant::<7>();
+        let with = |rpdos, tpdos| {
+            let node = crate::network::sample::epos4(id, "axis 7");
+            let kind = Box::leak(Box::new(Kind {
+                rpdos,
+                tpdos,
+                ..*node.kind
+            }));
+            AxisPdos::of(&Node { kind, ..node })
         };
-        let pdos = AxisPdos::of(&node).unwrap();
-        let frame = pdos.ramps(&COMMAND, node.id).unwrap();
+        let pdos = with(RPDOS, TPDOS).unwrap();
+        let frame = pdos.ramps(&COMMAND, id).unwrap();
         assert_eq!(frame.id().get(), 0x207);
         assert_eq!(frame.data(), [4, 3, 2, 1, 0xDC, 0x05, 0, 0]);
-        let frame = pdos.cyclic(&COMMAND, node.id).unwrap();
+        let frame = pdos.cyclic(&COMMAND, id).unwrap();
         assert_eq!(frame.id().get(), 0x507);
         assert_eq!(frame.data(), [0x50, 0xFB, 0xFF, 0xFF, 0x0F, 0x00]);
         // The upper half of the target is under the controlword.
-        let torque = pdos.cyclic(&in_mode(Mode::CyclicTorque), node.id).unwrap();
+        let torque = pdos.cyclic(&in_mode(Mode::CyclicTorque), id).unwrap();
         assert_eq!(torque.data(), [0x50, 0xFB, 0x0F, 0x00]);
         assert!(!pdos.has_mode(Mode::CyclicPosition));
-        assert_eq!(pdos.cyclic(&in_mode(Mode::CyclicPosition), node.id), None);
+        assert_eq!(pdos.cyclic(&in_mode(Mode::CyclicPosition), id), None);
         let tpdos = image([
             [3, 0xE8, 0x03, 0, 0, 0, 0, 0],
             [0xFE, 0xFF, 0xFF, 0xFF, 3, 0x37, 0x16, 0],
@@ -481,25 +489,16 @@ mod tests {
 
         assert!(pdos.has_velocity());
         const NO_VELOCITY: &[Pdo] = &[pdo(1, &[STATUSWORD, POSITION])];
-        let slow = AxisPdos::of(&Node {
-            tpdos: NO_VELOCITY,
-            ..node
-        });
-        let slow = slow.unwrap();
+        let slow = with(RPDOS, NO_VELOCITY).unwrap();
         assert!(!slow.has_velocity());
         assert_eq!(AxisPdos::tpdo_bytes(&[slow]), [[6, 0]]);
         assert_eq!(slow.feedback(&tpdos, true).velocity, 0);
 
-        let blind = Node { tpdos: &[], ..node };
-        assert_eq!(AxisPdos::of(&blind), None);
+        assert_eq!(with(RPDOS, &[]), None);
         const APART: &[Pdo] = &[
             pdo(1, &[CONTROLWORD, ACCELERATION]),
             pdo(2, &[TARGET_VELOCITY, DECELERATION]),
         ];
-        let apart = Node {
-            rpdos: APART,
-            ..node
-        };
-        assert_eq!(AxisPdos::of(&apart), None);
+        assert_eq!(with(APART, TPDOS), None);
     }
 }

@@ -49,14 +49,45 @@ pub struct Master {
 }
 
 /// One node and what it must be.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Node {
     /// Its node-ID.
     pub id: NodeId,
-    /// What people call it.
-    pub name: &'static str,
     /// Without a mandatory node the network does not start (1F81h, bit 3).
     pub mandatory: bool,
+    /// What people call it.
+    pub name: &'static str,
+    /// What 1018h:4 must say (1F88h). `None` is not checked.
+    pub serial: Option<u32>,
+    /// The rest, which can be read as if it were the node's own.
+    pub kind: &'static Kind,
+}
+
+impl core::ops::Deref for Node {
+    type Target = Kind;
+
+    fn deref(&self) -> &Kind {
+        self.kind
+    }
+}
+
+impl Node {
+    /// 1000h: 0; the sub-indices of 1018h: 1 ..= 4.
+    #[inline(never)]
+    pub(crate) const fn number(&self, n: u8) -> Option<u32> {
+        match n {
+            0 => self.kind.identity.device_type,
+            1 => self.kind.identity.vendor,
+            2 => self.kind.identity.product,
+            3 => self.kind.identity.revision,
+            _ => self.serial,
+        }
+    }
+}
+
+/// What nodes of one kind have in common: it lies in flash once.
+#[derive(Clone, Copy, Debug)]
+pub struct Kind {
     /// What 1000h and 1018h must say.
     pub identity: Identity,
     /// Producer heartbeat time of the node (1017h), milliseconds; 0 = none.
@@ -78,7 +109,8 @@ pub struct Node {
     pub configured: [u32; 2],
 }
 
-/// Expected identity (1F84h .. 1F88h, CiA 302-2). `None` is not checked.
+/// Expected identity but for the serial number (1F84h .. 1F87h, CiA 302-2). `None` is
+/// not checked.
 #[derive(Clone, Copy, Debug)]
 pub struct Identity {
     /// 1000h.
@@ -89,22 +121,6 @@ pub struct Identity {
     pub product: Option<u32>,
     /// 1018h:3.
     pub revision: Option<u32>,
-    /// 1018h:4.
-    pub serial: Option<u32>,
-}
-
-impl Identity {
-    /// 1000h: 0; the sub-indices of 1018h: 1 ..= 4.
-    #[inline(never)]
-    pub(crate) const fn number(&self, n: u8) -> Option<u32> {
-        match n {
-            0 => self.device_type,
-            1 => self.vendor,
-            2 => self.product,
-            3 => self.revision,
-            _ => self.serial,
-        }
-    }
 }
 
 /// One PDO of a node, with the identifier of the predefined connection set.

@@ -1,7 +1,7 @@
 //! The sample network: six maxon EPOS4 with 2000 increments per turn, on one
 //! bus at 1 Mbit/s, in profile velocity mode.
 
-use super::{ConfigWrite, Identity, Master, Network, Node, Pdo};
+use super::{ConfigWrite, Identity, Kind, Master, Network, Node, Pdo};
 use crate::id::NodeId;
 use crate::objects;
 use crate::pdo::{MappingEntry, Transmission};
@@ -124,26 +124,37 @@ pub(crate) const fn epos4(id: NodeId, name: &'static str) -> Node {
         id,
         name,
         mandatory: true,
-        identity: Identity {
-            device_type: Some(EPOS4_DEVICE_TYPE),
-            vendor: Some(MAXON),
-            product: Some(EPOS4_50_5),
-            revision: Some(EPOS4_REVISION),
-            serial: Some(FIRST_SERIAL + id.get() as u32),
-        },
-        // Ten per second each, until it is operational and its TPDOs tell: a dead
-        // drive is known within two periods.
-        heartbeat_ms: 100,
-        // Four of the master's periods, so that one lost frame stops nobody.
-        consumer_ms: 200,
-        rpdos: RPDOS,
-        tpdos: TPDO1,
-        start_values: START_VALUES,
-        sdo_timeout: Duration::from_millis(100),
-        // An EPOS4 has no 1020h.
-        configured: [0; 2],
+        serial: Some(FIRST_SERIAL + id.get() as u32),
+        kind: &EPOS4,
     }
 }
+
+const EPOS4: Kind = Kind {
+    identity: Identity {
+        device_type: Some(EPOS4_DEVICE_TYPE),
+        vendor: Some(MAXON),
+        product: Some(EPOS4_50_5),
+        revision: Some(EPOS4_REVISION),
+    },
+    // Ten per second each, until it is operational and its TPDOs tell: a dead
+    // drive is known within two periods.
+    heartbeat_ms: 100,
+    // Four of the master's periods, so that one lost frame stops nobody.
+    consumer_ms: 200,
+    rpdos: RPDOS,
+    tpdos: TPDO1,
+    start_values: START_VALUES,
+    sdo_timeout: Duration::from_millis(100),
+    // An EPOS4 has no 1020h.
+    configured: [0; 2],
+};
+
+/// With both TPDOs, in a longer cycle.
+const UNHURRIED: Kind = Kind {
+    tpdos: TPDOS,
+    start_values: LONG_START_VALUES,
+    ..EPOS4
+};
 
 const fn six() -> [Node; 6] {
     [
@@ -160,8 +171,7 @@ const fn six() -> [Node; 6] {
 const fn unhurried([a, b, c, d, e, f]: [Node; 6]) -> [Node; 6] {
     const fn one(node: Node) -> Node {
         Node {
-            tpdos: TPDOS,
-            start_values: LONG_START_VALUES,
+            kind: &UNHURRIED,
             ..node
         }
     }

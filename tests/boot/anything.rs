@@ -11,14 +11,14 @@ const SERIAL: u32 = 0x4711;
 
 /// Node 2 waits for an answer that does not come.
 fn mute(entry: (u16, u8)) -> Rig {
-    let mut rig = Rig::new(network(2, |_| {}));
+    let mut rig = Rig::new(network(2, |_, _| {}));
     rig.fakes[1].mute = Some(entry);
     rig.run_for(ms(850));
     rig
 }
 
 fn running(bits: u32) -> Rig {
-    let mut rig = Rig::with(network(2, |_| {}), |settings| settings.startup.0 |= bits);
+    let mut rig = Rig::with(network(2, |_, _| {}), |settings| settings.startup.0 |= bits);
     rig.run_for(ms(2000));
     assert!(rig.boot.is_ready());
     rig
@@ -26,7 +26,7 @@ fn running(bits: u32) -> Rig {
 
 /// Nobody has told yet which nodes have no node-ID.
 fn scanning(after: u32) -> Rig {
-    let mut rig = Rig::new(network(2, |node| node.identity.serial = Some(SERIAL)));
+    let mut rig = Rig::new(network(2, |node, _| node.serial = Some(SERIAL)));
     unconfigured(&mut rig.fakes[1], SERIAL);
     rig.run_for(ms(2100 + after));
     rig
@@ -36,12 +36,16 @@ fn scanning(after: u32) -> Rig {
 type Place = (&'static str, &'static str, fn() -> Rig);
 
 const STATES: &[Place] = &[
-    ("silent", "phase: Silent", || Rig::new(network(2, |_| {}))),
+    ("silent", "phase: Silent", || {
+        Rig::new(network(2, |_, _| {}))
+    }),
     ("another device is the master", "phase: NotMaster", || {
-        Rig::with(network(2, |_| {}), |settings| settings.startup = Startup(0))
+        Rig::with(network(2, |_, _| {}), |settings| {
+            settings.startup = Startup(0)
+        })
     }),
     ("boot-up frame awaited", "state: AwaitBootUp(", || {
-        let mut rig = Rig::new(network(2, |_| {}));
+        let mut rig = Rig::new(network(2, |_, _| {}));
         rig.fakes[1].missing = true;
         rig.run_for(ms(850));
         rig
@@ -62,19 +66,19 @@ const STATES: &[Place] = &[
         rig
     }),
     ("state awaited", "state: AwaitState(", || {
-        let mut rig = Rig::with(network(2, |_| {}), assign(2, KEEP_ALIVE));
+        let mut rig = Rig::with(network(2, |_, _| {}), assign(2, KEEP_ALIVE));
         rig.fakes[1].runs(OPERATIONAL, None);
         rig.run_for(ms(650));
         rig
     }),
     ("reset on the way", "restored: false", || {
-        let mut rig = Rig::with(network(2, |_| {}), assign(2, KEEP_ALIVE));
+        let mut rig = Rig::with(network(2, |_, _| {}), assign(2, KEEP_ALIVE));
         rig.fakes[1].runs(PRE_OPERATIONAL, Some(ms(100)));
         rig.run_for(ms(750));
         rig
     }),
     ("signature asked for", "state: Verify(", || {
-        let mut rig = Rig::new(network(2, |node| node.configured = [1, 2]));
+        let mut rig = Rig::new(network(2, |_, kind| kind.configured = [1, 2]));
         rig.fakes[1].set((0x1020, 1), 7);
         rig.fakes[1].set((0x1020, 2), 7);
         rig.fakes[1].mute = Some((0x1020, 1));
@@ -82,7 +86,7 @@ const STATES: &[Place] = &[
         rig
     }),
     ("parameters being restored", "state: Restore(", || {
-        let mut rig = Rig::with(network(2, |_| {}), |settings| {
+        let mut rig = Rig::with(network(2, |_, _| {}), |settings| {
             assign(2, Assignment::RESTORE)(settings);
             settings.nodes[1].restore = 1;
         });
@@ -91,7 +95,7 @@ const STATES: &[Place] = &[
         rig
     }),
     ("reset after that", "restored: true", || {
-        let mut rig = Rig::with(network(2, |_| {}), |settings| {
+        let mut rig = Rig::with(network(2, |_, _| {}), |settings| {
             assign(2, Assignment::RESTORE)(settings);
             settings.nodes[1].restore = 1;
         });
@@ -100,32 +104,32 @@ const STATES: &[Place] = &[
     }),
     ("configuring", "state: Configure(", || mute((0x6060, 0))),
     ("heartbeat awaited", "state: AwaitErrorControl(", || {
-        let mut rig = Rig::new(network(2, |_| {}));
+        let mut rig = Rig::new(network(2, |_, _| {}));
         rig.fakes[1].no_heartbeat = true;
         rig.run_for(ms(850));
         rig
     }),
     ("ready, another one is awaited", "state: Ready(", || {
-        let mut rig = Rig::new(network(2, |_| {}));
+        let mut rig = Rig::new(network(2, |_, _| {}));
         rig.fakes[0].missing = true;
         rig.run_for(ms(950));
         rig
     }),
     ("order awaited", "phase: AwaitingOrder", || {
-        let mut rig = Rig::with(network(2, |_| {}), |settings| {
+        let mut rig = Rig::with(network(2, |_, _| {}), |settings| {
             settings.startup.0 |= Startup::NOT_BY_ITSELF;
         });
         rig.run_for(ms(1500));
         rig
     }),
     ("SYNC runs", "phase: Synchronising", || {
-        let mut rig = Rig::new(network(2, |_| {}));
+        let mut rig = Rig::new(network(2, |_, _| {}));
         rig.run_for(ms(910));
         assert!(rig.sync);
         rig
     }),
     ("starting", "state: Starting(", || {
-        let mut rig = Rig::new(network(2, |_| {}));
+        let mut rig = Rig::new(network(2, |_, _| {}));
         rig.run_for(ms(950));
         assert_eq!(rig.nmt().last(), Some(&[0x01, 0]));
         rig
@@ -144,7 +148,7 @@ const STATES: &[Place] = &[
         rig
     }),
     ("failed", "phase: Failed", || {
-        let mut rig = Rig::new(network(2, |_| {}));
+        let mut rig = Rig::new(network(2, |_, _| {}));
         rig.fakes[1].missing = true;
         rig.run_for(ms(3000));
         assert!(rig.boot.is_failed());

@@ -46,7 +46,7 @@ fn the_pause_grows_while_the_bus_stays_bad() {
 
 #[test]
 fn a_node_that_is_missing_after_bus_off_is_waited_for() {
-    let mut rig = Rig::new(network(3, |_| {}));
+    let mut rig = Rig::new(network(3, |_, _| {}));
     rig.run_for(ms(2000));
     rig.fakes[1].missing = true;
     rig.boot.bus_off(rig.now);
@@ -64,7 +64,7 @@ fn a_node_that_is_missing_after_bus_off_is_waited_for() {
 
 #[test]
 fn bus_off_in_the_start_does_not_excuse_a_missing_node() {
-    let mut rig = Rig::new(network(3, |_| {}));
+    let mut rig = Rig::new(network(3, |_, _| {}));
     rig.fakes[1].missing = true;
     rig.run_for(ms(1000));
     rig.boot.bus_off(rig.now);

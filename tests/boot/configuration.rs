@@ -9,7 +9,7 @@ const DATE: u32 = 15_000;
 const TIME: u32 = 43_200_000;
 
 fn dated() -> &'static Network {
-    network(2, |node| node.configured = [DATE, TIME])
+    network(2, |_, kind| kind.configured = [DATE, TIME])
 }
 
 #[test]
@@ -62,7 +62,7 @@ fn another_configuration_is_written_with_its_date_and_time_last() {
 
 #[test]
 fn parameters_are_restored_by_a_reset_before_they_are_written() {
-    let mut rig = Rig::with(network(2, |_| {}), |settings| {
+    let mut rig = Rig::with(network(2, |_, _| {}), |settings| {
         assign(2, Assignment::RESTORE)(settings);
         settings.nodes[1].restore = 1;
     });
@@ -85,7 +85,7 @@ fn parameters_are_restored_by_a_reset_before_they_are_written() {
 
 #[test]
 fn a_node_that_cannot_be_restored_is_given_up() {
-    let mut rig = Rig::with(network(2, |_| {}), |settings| {
+    let mut rig = Rig::with(network(2, |_, _| {}), |settings| {
         assign(2, Assignment::RESTORE)(settings);
         settings.nodes[1].restore = 4;
     });
@@ -97,7 +97,7 @@ fn a_node_that_cannot_be_restored_is_given_up() {
 
 #[test]
 fn each_node_has_its_own_sdo_timeout() {
-    let slow = network(2, |node| node.sdo_timeout = ms(300));
+    let slow = network(2, |_, kind| kind.sdo_timeout = ms(300));
     let mut rig = Rig::new(slow);
     for fake in &mut rig.fakes {
         fake.mute = Some((0x1018, 2));

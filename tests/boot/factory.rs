@@ -9,7 +9,7 @@ use canmaster::network::sample::SIX_EPOS4;
 
 /// Node 2 is named by its serial number.
 fn serials() -> &'static Network {
-    network(3, |node| node.identity.serial = Some(0x0000_4711))
+    network(3, |node, _| node.serial = Some(0x0000_4711))
 }
 
 #[test]
@@ -139,7 +139,7 @@ fn where_nobody_is_without_node_id_a_missing_node_costs_one_question_more() {
 
 #[test]
 fn where_no_serial_number_is_named_nobody_is_looked_for() {
-    let mut rig = Rig::new(network(3, |_| {}));
+    let mut rig = Rig::new(network(3, |_, _| {}));
     unconfigured(&mut rig.fakes[1], 0x4711);
     rig.run_for(ms(2101));
     rig.assert_nothing_was_started();

@@ -9,7 +9,7 @@ const GUARDING: u32 = 100 << 16 | 2 << 8;
 
 /// Node 2 is guarded and operational.
 fn running() -> Rig {
-    let network = network(2, |node| node.heartbeat_ms = 0);
+    let network = network(2, |_, kind| kind.heartbeat_ms = 0);
     let mut rig = Rig::with(network, assign(2, GUARDING));
     rig.fakes[1].toggle = Some(false);
     rig.run_for(ms(2000));

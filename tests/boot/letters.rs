@@ -3,11 +3,11 @@
 use crate::networks::network;
 use crate::rig::{Fake, OPERATIONAL, PRE_OPERATIONAL, Rig, ms};
 use canmaster::boot::{Assignment, Cause, Event, NodeSettings};
-use canmaster::network::Node;
+use canmaster::network::{Kind, Node};
 
 struct Case {
     letter: Option<char>,
-    node: fn(&mut Node),
+    node: fn(&mut Node, &mut Kind),
     settings: fn(&mut NodeSettings),
     fake: fn(&mut Fake),
     started: bool,
@@ -17,7 +17,7 @@ const KEEP_ALIVE: u32 = Assignment::KEEP_ALIVE;
 const GUARD_TIME: u32 = 50 << 16;
 const PLAIN: Case = Case {
     letter: None,
-    node: |_| {},
+    node: |_, _| {},
     settings: |_| {},
     fake: |_| {},
     started: true,
@@ -59,7 +59,7 @@ fn each_letter_is_reached() {
         },
         Case {
             letter: Some('F'),
-            node: |node| node.heartbeat_ms = 0,
+            node: |_, kind| kind.heartbeat_ms = 0,
             settings: |node| node.assignment.0 |= KEEP_ALIVE | GUARD_TIME,
             fake: |fake| fake.runs(OPERATIONAL, None),
             ..FAILS
@@ -92,7 +92,7 @@ fn each_letter_is_reached() {
         },
         Case {
             letter: Some('O'),
-            node: |node| node.identity.serial = Some(7),
+            node: |node, _| node.serial = Some(7),
             fake: |fake| fake.set((0x1018, 4), 8),
             ..FAILS
         },
@@ -114,7 +114,7 @@ fn each_letter_is_reached() {
 
 #[test]
 fn a_node_that_is_not_listed_is_left_alone() {
-    let mut rig = Rig::with(network(2, |_| {}), |settings| {
+    let mut rig = Rig::with(network(2, |_, _| {}), |settings| {
         settings.nodes[1].assignment = Assignment(0);
     });
     rig.run_for(ms(2000));
@@ -127,7 +127,7 @@ fn a_node_that_is_not_listed_is_left_alone() {
 
 #[test]
 fn a_node_that_may_not_be_started_is_only_watched() {
-    let mut rig = Rig::with(network(2, |_| {}), |settings| {
+    let mut rig = Rig::with(network(2, |_, _| {}), |settings| {
         settings.nodes[1].assignment.0 &= !Assignment::MAY_START;
     });
     rig.run_for(ms(850));
@@ -141,7 +141,10 @@ fn a_node_that_may_not_be_started_is_only_watched() {
 
 #[test]
 fn a_node_to_be_kept_alive_that_runs_is_neither_reset_nor_configured() {
-    let mut rig = Rig::with(network(2, |_| {}), crate::networks::assign(2, KEEP_ALIVE));
+    let mut rig = Rig::with(
+        network(2, |_, _| {}),
+        crate::networks::assign(2, KEEP_ALIVE),
+    );
     rig.fakes[1].runs(OPERATIONAL, Some(ms(100)));
     rig.run_for(ms(2000));
     assert!(rig.boot.is_ready());
@@ -152,7 +155,10 @@ fn a_node_to_be_kept_alive_that_runs_is_neither_reset_nor_configured() {
 
 #[test]
 fn a_node_to_be_kept_alive_that_does_not_run_is_reset_and_configured() {
-    let mut rig = Rig::with(network(2, |_| {}), crate::networks::assign(2, KEEP_ALIVE));
+    let mut rig = Rig::with(
+        network(2, |_, _| {}),
+        crate::networks::assign(2, KEEP_ALIVE),
+    );
     rig.fakes[1].runs(PRE_OPERATIONAL, Some(ms(100)));
     rig.run_for(ms(2000));
     assert!(rig.boot.is_ready());
@@ -169,7 +175,7 @@ fn a_node_to_be_kept_alive_that_does_not_run_is_reset_and_configured() {
 
 #[test]
 fn a_guarded_node_is_asked_by_remote_frames() {
-    let network = network(2, |node| node.heartbeat_ms = 0);
+    let network = network(2, |_, kind| kind.heartbeat_ms = 0);
     let mut rig = Rig::with(network, crate::networks::assign(2, GUARD_TIME));
     rig.fakes[1].toggle = Some(false);
     rig.run_for(ms(2000));
@@ -181,7 +187,7 @@ fn a_guarded_node_is_asked_by_remote_frames() {
 
 #[test]
 fn an_unanswered_guarding_is_told_from_a_missing_heartbeat_in_words() {
-    let network = network(2, |node| node.heartbeat_ms = 0);
+    let network = network(2, |_, kind| kind.heartbeat_ms = 0);
     let mut rig = Rig::with(
         network,
         crate::networks::assign(2, KEEP_ALIVE | GUARD_TIME | 2 << 8),

@@ -23,7 +23,7 @@ fn restart(rig: &mut Rig, n: usize) {
 
 #[test]
 fn a_node_that_restarts_while_the_network_runs_is_booted_again_and_started_alone() {
-    let mut rig = running(network(3, |_| {}));
+    let mut rig = running(network(3, |_, _| {}));
     restart(&mut rig, 1);
     rig.run_for(ms(1000));
     assert_eq!(rig.nmt(), [[0x80, 2], [0x01, 2]]);
@@ -49,7 +49,7 @@ fn a_node_that_restarts_while_the_network_runs_is_booted_again_and_started_alone
 
 #[test]
 fn a_node_that_fell_silent_is_reset_and_booted_again() {
-    let mut rig = running(network(3, |_| {}));
+    let mut rig = running(network(3, |_, _| {}));
     rig.fakes[1].missing = true;
     rig.boot.node_lost(id(2));
     rig.run();
@@ -71,7 +71,7 @@ fn a_node_that_fell_silent_is_reset_and_booted_again() {
 /// It boots while its cable is cut, sends in vain, and says so when it is heard.
 #[test]
 fn a_node_that_was_cut_off_while_it_booted_is_reset() {
-    let mut rig = Rig::new(network(3, |_| {}));
+    let mut rig = Rig::new(network(3, |_, _| {}));
     while rig.requests(2).is_empty() {
         rig.run_for(ms(1));
     }
@@ -86,7 +86,7 @@ fn a_node_that_was_cut_off_while_it_booted_is_reset() {
 
 #[test]
 fn a_master_that_is_silent_resets_nobody() {
-    let mut rig = Rig::new(network(3, |_| {}));
+    let mut rig = Rig::new(network(3, |_, _| {}));
     rig.boot.node_cut_off(id(2), rig.now);
     rig.run();
     assert_eq!(rig.nmt(), [[0; 2]; 0]);
@@ -94,7 +94,7 @@ fn a_master_that_is_silent_resets_nobody() {
 
 #[test]
 fn a_node_that_leaves_operational_by_itself_is_booted_again() {
-    let mut rig = running(network(3, |_| {}));
+    let mut rig = running(network(3, |_, _| {}));
     rig.fakes[1].state = PRE_OPERATIONAL;
     rig.run_for(ms(1000));
     assert_eq!(rig.nmt(), [[0x82, 2], [0x80, 2], [0x01, 2]]);
@@ -103,7 +103,7 @@ fn a_node_that_leaves_operational_by_itself_is_booted_again() {
 
 #[test]
 fn nobody_is_started_while_a_mandatory_node_is_missing() {
-    let mut rig = running(network(3, |_| {}));
+    let mut rig = running(network(3, |_, _| {}));
     rig.fakes[0].missing = true;
     rig.boot.node_lost(id(1));
     restart(&mut rig, 1);
@@ -156,7 +156,7 @@ fn the_loss_of_an_optional_node_leaves_the_network_ready() {
 
 #[test]
 fn a_boot_time_of_zero_waits_for_ever() {
-    let mut rig = Rig::with(network(2, |_| {}), |settings| {
+    let mut rig = Rig::with(network(2, |_, _| {}), |settings| {
         settings.boot_time = canmaster::Duration::ZERO;
     });
     rig.fakes[1].missing = true;
@@ -196,7 +196,7 @@ fn the_error_of_a_mandatory_node_stops_all_before_it_resets_all() {
 
 #[test]
 fn a_node_that_restarts_after_every_start_is_given_up() {
-    let mut rig = Rig::new(network(2, |_| {}));
+    let mut rig = Rig::new(network(2, |_, _| {}));
     rig.run_for(ms(500));
     // Ready 100 ms after its boot-up frame, started 20 ms later.
     rig.run_for(ms(300));
@@ -212,7 +212,7 @@ fn a_node_that_restarts_after_every_start_is_given_up() {
 
 #[test]
 fn a_node_that_resets_when_it_was_configured_is_configured_anew() {
-    let mut rig = Rig::new(network(3, |_| {}));
+    let mut rig = Rig::new(network(3, |_, _| {}));
     // Node 3 holds the start up.
     rig.fakes[2].no_heartbeat = true;
     rig.run_for(ms(950));
@@ -226,7 +226,7 @@ fn a_node_that_resets_when_it_was_configured_is_configured_anew() {
 
 #[test]
 fn a_node_that_resets_while_the_network_starts_holds_it_up() {
-    let mut rig = Rig::new(network(3, |_| {}));
+    let mut rig = Rig::new(network(3, |_, _| {}));
     // Started at 0.92 s, operational at 1 s.
     rig.run_for(ms(950));
     restart(&mut rig, 1);

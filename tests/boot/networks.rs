@@ -4,21 +4,17 @@ use crate::rig::{Fake, NODES, id, ms};
 use canmaster::NodeId;
 use canmaster::boot::Settings;
 use canmaster::lss::{LssAddress, LssSlave};
-use canmaster::network::{ConfigWrite, Identity, Master, Network, Node};
+use canmaster::network::{ConfigWrite, Identity, Kind, Master, Network, Node};
 
 /// A network of `n` small nodes; node 2 is made as the test wants it.
-pub(crate) fn network(n: u8, change: impl Fn(&mut Node)) -> &'static Network {
+pub(crate) fn network(n: u8, change: impl Fn(&mut Node, &mut Kind)) -> &'static Network {
     let nodes = (1..=n).map(|number| {
-        let mut node = Node {
-            id: id(number),
-            name: "node",
-            mandatory: true,
+        let mut kind = Kind {
             identity: Identity {
                 device_type: Some(0x0002_0192),
                 vendor: Some(0x0000_00FB),
                 product: Some(0x6150_0000),
                 revision: Some(0x0170_0000),
-                serial: None,
             },
             heartbeat_ms: 100,
             consumer_ms: 200,
@@ -28,9 +24,17 @@ pub(crate) fn network(n: u8, change: impl Fn(&mut Node)) -> &'static Network {
             sdo_timeout: ms(100),
             configured: [0; 2],
         };
+        let mut node = Node {
+            id: id(number),
+            mandatory: true,
+            name: "node",
+            serial: None,
+            kind: Box::leak(Box::new(kind)),
+        };
         if number == 2 {
-            change(&mut node);
+            change(&mut node, &mut kind);
         }
+        node.kind = Box::leak(Box::new(kind));
         node
     });
     Box::leak(Box::new(Network {
@@ -56,7 +60,7 @@ pub(crate) fn assign(node: usize, bits: u32) -> impl FnOnce(&mut Settings<NODES>
 }
 
 /// Makes a node optional.
-pub(crate) fn optional(node: &mut Node) {
+pub(crate) fn optional(node: &mut Node, _: &mut Kind) {
     node.mandatory = false;
 }
 

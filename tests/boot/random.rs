@@ -83,7 +83,7 @@ fn starts(rig: &Rig) -> usize {
 }
 
 fn with_bits(startup: u32, assignments: [u32; 3]) -> Rig {
-    let network = network(3, |node| node.identity.serial = Some(7));
+    let network = network(3, |node, _| node.serial = Some(7));
     let mut rig = Rig::with(network, |settings| {
         settings.startup = Startup(Startup::MASTER | startup & Startup::OFFERED);
         for (node, bits) in settings.nodes.iter_mut().zip(assignments) {
@@ -132,7 +132,7 @@ proptest! {
     fn whatever_happened_a_reset_of_all_leads_to_a_running_network(
         stimuli in proptest::collection::vec(stimulus(), 0..40),
     ) {
-        let mut rig = Rig::new(network(3, |_| {}));
+        let mut rig = Rig::new(network(3, |_, _| {}));
         for stimulus in &stimuli {
             apply(&mut rig, stimulus, None);
         }
@@ -147,7 +147,7 @@ proptest! {
 
 #[test]
 fn frames_of_strangers_are_left_alone() {
-    let mut rig = Rig::new(network(2, |_| {}));
+    let mut rig = Rig::new(network(2, |_, _| {}));
     rig.run_for(ms(700));
     rig.forget();
     for number in (0..0x800).filter(|number| !matches!(number, 0x701 | 0x702)) {

@@ -23,7 +23,9 @@ fn one_by_one_without_bit_1() {
 
 #[test]
 fn a_device_that_is_not_the_master_does_nothing() {
-    let mut rig = Rig::with(network(3, |_| {}), |settings| settings.startup = Startup(0));
+    let mut rig = Rig::with(network(3, |_, _| {}), |settings| {
+        settings.startup = Startup(0)
+    });
     rig.error_control(1, 0);
     rig.run_for(ms(5000));
     assert_eq!((rig.sent.len(), rig.events.len()), (0, 0));
@@ -113,7 +115,7 @@ fn a_node_that_is_reset_by_request_is_booted_again() {
 
 #[test]
 fn a_halted_start_is_begun_anew_by_a_reset_of_all() {
-    let mut rig = Rig::new(network(3, |_| {}));
+    let mut rig = Rig::new(network(3, |_, _| {}));
     rig.fakes[1].missing = true;
     rig.run_for(ms(3000));
     rig.assert_nothing_was_started();

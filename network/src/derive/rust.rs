@@ -27,7 +27,7 @@ fn write(machine: &Machine, library: &str, out: &mut String) -> std::fmt::Result
     writeln!(out, "use {library}::motion::experiment::Motor;")?;
     writeln!(
         out,
-        "use {library}::network::{{Identity, Master, Network, Node}};"
+        "use {library}::network::{{Identity, Kind, Master, Network, Node}};"
     )?;
     writeln!(out, "use {library}::time::Duration;\n")?;
     writeln!(out, "/// Axes of the group.")?;
@@ -83,6 +83,14 @@ fn write(machine: &Machine, library: &str, out: &mut String) -> std::fmt::Result
     out.push('\n');
     motors(machine, out)?;
     program(machine, out)?;
+    let kinds = kinds(machine, library)?;
+    let count = kinds.len();
+    writeln!(out, "/// What nodes have in common.")?;
+    writeln!(
+        out,
+        "static KINDS: [Kind; {count}] = [\n{}];\n",
+        kinds.concat()
+    )?;
     writeln!(out, "/// The bus \"{}\".", bus.name.escape_default())?;
     writeln!(out, "pub static NETWORK: Network = Network {{")?;
     writeln!(out, "    bit_rate: {},", bus.bit_rate)?;
@@ -108,7 +116,7 @@ fn write(machine: &Machine, library: &str, out: &mut String) -> std::fmt::Result
     )?;
     writeln!(out, "    }},\n    nodes: &[")?;
     for described in &machine.nodes {
-        node(described, library, out)?;
+        node(described, &kinds, library, out)?;
     }
     writeln!(out, "    ],\n}};")
 }
@@ -152,80 +160,103 @@ fn program(machine: &Machine, out: &mut String) -> std::fmt::Result {
     writeln!(out, "];\n")
 }
 
-fn node(node: &Node, library: &str, out: &mut String) -> std::fmt::Result {
+/// What nodes of one kind have in common is there once, so that it lies in flash once:
+/// the text of each kind, in the order of the first node that has it.
+fn kinds(machine: &Machine, library: &str) -> Result<Vec<String>, std::fmt::Error> {
+    let mut kinds = Vec::new();
+    for node in &machine.nodes {
+        let text = kind(node, library)?;
+        if !kinds.contains(&text) {
+            kinds.push(text);
+        }
+    }
+    Ok(kinds)
+}
+
+fn node(node: &Node, kinds: &[String], library: &str, out: &mut String) -> std::fmt::Result {
+    let text = kind(node, library)?;
+    let kind = kinds.iter().position(|kind| *kind == text).unwrap_or(0);
     writeln!(out, "        Node {{")?;
     writeln!(out, "            id: NodeId::constant::<{}>(),", node.id)?;
-    writeln!(out, "            name: \"{}\",", node.name.escape_default())?;
     writeln!(out, "            mandatory: {},", node.mandatory)?;
+    writeln!(out, "            name: \"{}\",", node.name.escape_default())?;
+    match node.identity.serial {
+        Some(serial) => writeln!(out, "            serial: Some(0x{serial:08X}),")?,
+        None => writeln!(out, "            serial: None,")?,
+    }
+    writeln!(out, "            kind: &KINDS[{kind}],\n        }},")
+}
+
+fn kind(node: &Node, library: &str) -> Result<String, std::fmt::Error> {
+    let mut text = String::new();
+    let out = &mut text;
+    writeln!(out, "    Kind {{")?;
     let Identity {
         device_type,
         vendor,
         product,
         revision,
-        serial,
+        ..
     } = node.identity;
-    writeln!(out, "            identity: Identity {{")?;
+    writeln!(out, "        identity: Identity {{")?;
     for (name, value) in [
         ("device_type", device_type),
         ("vendor", vendor),
         ("product", product),
         ("revision", revision),
-        ("serial", serial),
     ] {
         match value {
-            Some(value) => writeln!(out, "                {name}: Some(0x{value:08X}),")?,
-            None => writeln!(out, "                {name}: None,")?,
+            Some(value) => writeln!(out, "            {name}: Some(0x{value:08X}),")?,
+            None => writeln!(out, "            {name}: None,")?,
         }
     }
-    writeln!(out, "            }},")?;
-    writeln!(out, "            heartbeat_ms: {},", node.heartbeat_ms)?;
-    writeln!(out, "            consumer_ms: {},", node.master_timeout_ms)?;
+    writeln!(out, "        }},")?;
+    writeln!(out, "        heartbeat_ms: {},", node.heartbeat_ms)?;
+    writeln!(out, "        consumer_ms: {},", node.master_timeout_ms)?;
     pdos("rpdos", &node.rpdos, library, out)?;
     pdos("tpdos", &node.tpdos, library, out)?;
-    writeln!(out, "            start_values: &[")?;
+    writeln!(out, "        start_values: &[")?;
     for write in &node.start_values {
         writeln!(
             out,
-            "                {library}::network::ConfigWrite::u{}({}, 0x{:X}),",
+            "            {library}::network::ConfigWrite::u{}({}, 0x{:X}),",
             u32::from(write.bytes) * u8::BITS,
             address(write.at, library),
             write.value
         )?;
     }
-    writeln!(out, "            ],")?;
+    writeln!(out, "        ],")?;
     let timeout = node.sdo_timeout_ms;
     writeln!(
         out,
-        "            sdo_timeout: Duration::from_millis({timeout}),"
+        "        sdo_timeout: Duration::from_millis({timeout}),"
     )?;
     let [date, time] = node.configured;
-    writeln!(
-        out,
-        "            configured: [{date}, {time}],\n        }},"
-    )
+    writeln!(out, "        configured: [{date}, {time}],\n    }},")?;
+    Ok(text)
 }
 
 fn pdos(name: &str, pdos: &[Pdo], library: &str, out: &mut String) -> std::fmt::Result {
-    writeln!(out, "            {name}: &[")?;
+    writeln!(out, "        {name}: &[")?;
     for pdo in pdos {
-        writeln!(out, "                {library}::network::Pdo {{")?;
-        writeln!(out, "                    number: {},", pdo.number)?;
+        writeln!(out, "            {library}::network::Pdo {{")?;
+        writeln!(out, "                number: {},", pdo.number)?;
         writeln!(
             out,
-            "                    transmission: {library}::pdo::Transmission::from_code({}),",
+            "                transmission: {library}::pdo::Transmission::from_code({}),",
             pdo.transmission
         )?;
-        writeln!(out, "                    mapping: &[")?;
+        writeln!(out, "                mapping: &[")?;
         for entry in &pdo.mapping {
             writeln!(
                 out,
-                "                        {library}::pdo::MappingEntry::new(0x{:04X}, {}, {}),",
+                "                    {library}::pdo::MappingEntry::new(0x{:04X}, {}, {}),",
                 entry.at.index, entry.at.sub, entry.bits
             )?;
         }
-        writeln!(out, "                    ],\n                }},")?;
+        writeln!(out, "                ],\n                }},")?;
     }
-    writeln!(out, "            ],")
+    writeln!(out, "        ],")
 }
 
 fn address(at: Address, library: &str) -> String {

@@ -2,7 +2,7 @@
 
 use canmaster::id::NodeId;
 use canmaster::motion::experiment::Motor;
-use canmaster::network::{Identity, Master, Network, Node};
+use canmaster::network::{Identity, Kind, Master, Network, Node};
 use canmaster::time::Duration;
 
 /// Axes of the group.
@@ -125,6 +125,75 @@ pub static PROGRAM: [u8; 226] = [
     0x40, 0x06, 0x00, 0x00, 0x84, 0x03, 0x00, 0x00, 0x80, 0x10,
 ];
 
+/// What nodes have in common.
+static KINDS: [Kind; 1] = [
+    Kind {
+        identity: Identity {
+            device_type: Some(0x00020192),
+            vendor: Some(0x000000FB),
+            product: Some(0x61500000),
+            revision: Some(0x01700000),
+        },
+        heartbeat_ms: 100,
+        consumer_ms: 200,
+        rpdos: &[
+            canmaster::network::Pdo {
+                number: 1,
+                transmission: canmaster::pdo::Transmission::from_code(1),
+                mapping: &[
+                    canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
+                    canmaster::pdo::MappingEntry::new(0x60FF, 0, 32),
+                ],
+                },
+            canmaster::network::Pdo {
+                number: 2,
+                transmission: canmaster::pdo::Transmission::from_code(1),
+                mapping: &[
+                    canmaster::pdo::MappingEntry::new(0x6083, 0, 32),
+                    canmaster::pdo::MappingEntry::new(0x6084, 0, 32),
+                ],
+                },
+            canmaster::network::Pdo {
+                number: 3,
+                transmission: canmaster::pdo::Transmission::from_code(1),
+                mapping: &[
+                    canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
+                    canmaster::pdo::MappingEntry::new(0x607A, 0, 32),
+                ],
+                },
+            canmaster::network::Pdo {
+                number: 4,
+                transmission: canmaster::pdo::Transmission::from_code(1),
+                mapping: &[
+                    canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
+                    canmaster::pdo::MappingEntry::new(0x6071, 0, 16),
+                ],
+                },
+        ],
+        tpdos: &[
+            canmaster::network::Pdo {
+                number: 1,
+                transmission: canmaster::pdo::Transmission::from_code(1),
+                mapping: &[
+                    canmaster::pdo::MappingEntry::new(0x6041, 0, 16),
+                    canmaster::pdo::MappingEntry::new(0x6064, 0, 32),
+                ],
+                },
+        ],
+        start_values: &[
+            canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x6060, 0), 0x3),
+            canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x60C2, 1), 0x2),
+            canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x607F, 0), 0xBB8),
+            canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x6080, 0), 0xBB8),
+            canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x60C5, 0), 0x4E20),
+            canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x6085, 0), 0x2710),
+            canmaster::network::ConfigWrite::u16(canmaster::id::Address::new(0x6007, 0), 0x3),
+        ],
+        sdo_timeout: Duration::from_millis(100),
+        configured: [0, 0],
+    },
+];
+
 /// The bus "main".
 pub static NETWORK: Network = Network {
     bit_rate: 1000000,
@@ -140,417 +209,45 @@ pub static NETWORK: Network = Network {
     nodes: &[
         Node {
             id: NodeId::constant::<1>(),
-            name: "axis 1",
             mandatory: true,
-            identity: Identity {
-                device_type: Some(0x00020192),
-                vendor: Some(0x000000FB),
-                product: Some(0x61500000),
-                revision: Some(0x01700000),
-                serial: Some(0x26000001),
-            },
-            heartbeat_ms: 100,
-            consumer_ms: 200,
-            rpdos: &[
-                canmaster::network::Pdo {
-                    number: 1,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
-                        canmaster::pdo::MappingEntry::new(0x60FF, 0, 32),
-                    ],
-                },
-                canmaster::network::Pdo {
-                    number: 2,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x6083, 0, 32),
-                        canmaster::pdo::MappingEntry::new(0x6084, 0, 32),
-                    ],
-                },
-                canmaster::network::Pdo {
-                    number: 3,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
-                        canmaster::pdo::MappingEntry::new(0x607A, 0, 32),
-                    ],
-                },
-                canmaster::network::Pdo {
-                    number: 4,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
-                        canmaster::pdo::MappingEntry::new(0x6071, 0, 16),
-                    ],
-                },
-            ],
-            tpdos: &[
-                canmaster::network::Pdo {
-                    number: 1,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x6041, 0, 16),
-                        canmaster::pdo::MappingEntry::new(0x6064, 0, 32),
-                    ],
-                },
-            ],
-            start_values: &[
-                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x6060, 0), 0x3),
-                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x60C2, 1), 0x2),
-                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x607F, 0), 0xBB8),
-                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x6080, 0), 0xBB8),
-                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x60C5, 0), 0x4E20),
-                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x6085, 0), 0x2710),
-                canmaster::network::ConfigWrite::u16(canmaster::id::Address::new(0x6007, 0), 0x3),
-            ],
-            sdo_timeout: Duration::from_millis(100),
-            configured: [0, 0],
+            name: "axis 1",
+            serial: Some(0x26000001),
+            kind: &KINDS[0],
         },
         Node {
             id: NodeId::constant::<2>(),
-            name: "axis 2",
             mandatory: true,
-            identity: Identity {
-                device_type: Some(0x00020192),
-                vendor: Some(0x000000FB),
-                product: Some(0x61500000),
-                revision: Some(0x01700000),
-                serial: Some(0x26000002),
-            },
-            heartbeat_ms: 100,
-            consumer_ms: 200,
-            rpdos: &[
-                canmaster::network::Pdo {
-                    number: 1,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
-                        canmaster::pdo::MappingEntry::new(0x60FF, 0, 32),
-                    ],
-                },
-                canmaster::network::Pdo {
-                    number: 2,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x6083, 0, 32),
-                        canmaster::pdo::MappingEntry::new(0x6084, 0, 32),
-                    ],
-                },
-                canmaster::network::Pdo {
-                    number: 3,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
-                        canmaster::pdo::MappingEntry::new(0x607A, 0, 32),
-                    ],
-                },
-                canmaster::network::Pdo {
-                    number: 4,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
-                        canmaster::pdo::MappingEntry::new(0x6071, 0, 16),
-                    ],
-                },
-            ],
-            tpdos: &[
-                canmaster::network::Pdo {
-                    number: 1,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x6041, 0, 16),
-                        canmaster::pdo::MappingEntry::new(0x6064, 0, 32),
-                    ],
-                },
-            ],
-            start_values: &[
-                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x6060, 0), 0x3),
-                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x60C2, 1), 0x2),
-                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x607F, 0), 0xBB8),
-                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x6080, 0), 0xBB8),
-                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x60C5, 0), 0x4E20),
-                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x6085, 0), 0x2710),
-                canmaster::network::ConfigWrite::u16(canmaster::id::Address::new(0x6007, 0), 0x3),
-            ],
-            sdo_timeout: Duration::from_millis(100),
-            configured: [0, 0],
+            name: "axis 2",
+            serial: Some(0x26000002),
+            kind: &KINDS[0],
         },
         Node {
             id: NodeId::constant::<3>(),
-            name: "axis 3",
             mandatory: true,
-            identity: Identity {
-                device_type: Some(0x00020192),
-                vendor: Some(0x000000FB),
-                product: Some(0x61500000),
-                revision: Some(0x01700000),
-                serial: Some(0x26000003),
-            },
-            heartbeat_ms: 100,
-            consumer_ms: 200,
-            rpdos: &[
-                canmaster::network::Pdo {
-                    number: 1,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
-                        canmaster::pdo::MappingEntry::new(0x60FF, 0, 32),
-                    ],
-                },
-                canmaster::network::Pdo {
-                    number: 2,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x6083, 0, 32),
-                        canmaster::pdo::MappingEntry::new(0x6084, 0, 32),
-                    ],
-                },
-                canmaster::network::Pdo {
-                    number: 3,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
-                        canmaster::pdo::MappingEntry::new(0x607A, 0, 32),
-                    ],
-                },
-                canmaster::network::Pdo {
-                    number: 4,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
-                        canmaster::pdo::MappingEntry::new(0x6071, 0, 16),
-                    ],
-                },
-            ],
-            tpdos: &[
-                canmaster::network::Pdo {
-                    number: 1,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x6041, 0, 16),
-                        canmaster::pdo::MappingEntry::new(0x6064, 0, 32),
-                    ],
-                },
-            ],
-            start_values: &[
-                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x6060, 0), 0x3),
-                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x60C2, 1), 0x2),
-                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x607F, 0), 0xBB8),
-                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x6080, 0), 0xBB8),
-                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x60C5, 0), 0x4E20),
-                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x6085, 0), 0x2710),
-                canmaster::network::ConfigWrite::u16(canmaster::id::Address::new(0x6007, 0), 0x3),
-            ],
-            sdo_timeout: Duration::from_millis(100),
-            configured: [0, 0],
+            name: "axis 3",
+            serial: Some(0x26000003),
+            kind: &KINDS[0],
         },
         Node {
             id: NodeId::constant::<4>(),
-            name: "axis 4",
             mandatory: true,
-            identity: Identity {
-                device_type: Some(0x00020192),
-                vendor: Some(0x000000FB),
-                product: Some(0x61500000),
-                revision: Some(0x01700000),
-                serial: Some(0x26000004),
-            },
-            heartbeat_ms: 100,
-            consumer_ms: 200,
-            rpdos: &[
-                canmaster::network::Pdo {
-                    number: 1,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
-                        canmaster::pdo::MappingEntry::new(0x60FF, 0, 32),
-                    ],
-                },
-                canmaster::network::Pdo {
-                    number: 2,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x6083, 0, 32),
-                        canmaster::pdo::MappingEntry::new(0x6084, 0, 32),
-                    ],
-                },
-                canmaster::network::Pdo {
-                    number: 3,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
-                        canmaster::pdo::MappingEntry::new(0x607A, 0, 32),
-                    ],
-                },
-                canmaster::network::Pdo {
-                    number: 4,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
-                        canmaster::pdo::MappingEntry::new(0x6071, 0, 16),
-                    ],
-                },
-            ],
-            tpdos: &[
-                canmaster::network::Pdo {
-                    number: 1,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x6041, 0, 16),
-                        canmaster::pdo::MappingEntry::new(0x6064, 0, 32),
-                    ],
-                },
-            ],
-            start_values: &[
-                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x6060, 0), 0x3),
-                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x60C2, 1), 0x2),
-                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x607F, 0), 0xBB8),
-                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x6080, 0), 0xBB8),
-                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x60C5, 0), 0x4E20),
-                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x6085, 0), 0x2710),
-                canmaster::network::ConfigWrite::u16(canmaster::id::Address::new(0x6007, 0), 0x3),
-            ],
-            sdo_timeout: Duration::from_millis(100),
-            configured: [0, 0],
+            name: "axis 4",
+            serial: Some(0x26000004),
+            kind: &KINDS[0],
         },
         Node {
             id: NodeId::constant::<5>(),
-            name: "axis 5",
             mandatory: true,
-            identity: Identity {
-                device_type: Some(0x00020192),
-                vendor: Some(0x000000FB),
-                product: Some(0x61500000),
-                revision: Some(0x01700000),
-                serial: Some(0x26000005),
-            },
-            heartbeat_ms: 100,
-            consumer_ms: 200,
-            rpdos: &[
-                canmaster::network::Pdo {
-                    number: 1,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
-                        canmaster::pdo::MappingEntry::new(0x60FF, 0, 32),
-                    ],
-                },
-                canmaster::network::Pdo {
-                    number: 2,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x6083, 0, 32),
-                        canmaster::pdo::MappingEntry::new(0x6084, 0, 32),
-                    ],
-                },
-                canmaster::network::Pdo {
-                    number: 3,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
-                        canmaster::pdo::MappingEntry::new(0x607A, 0, 32),
-                    ],
-                },
-                canmaster::network::Pdo {
-                    number: 4,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
-                        canmaster::pdo::MappingEntry::new(0x6071, 0, 16),
-                    ],
-                },
-            ],
-            tpdos: &[
-                canmaster::network::Pdo {
-                    number: 1,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x6041, 0, 16),
-                        canmaster::pdo::MappingEntry::new(0x6064, 0, 32),
-                    ],
-                },
-            ],
-            start_values: &[
-                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x6060, 0), 0x3),
-                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x60C2, 1), 0x2),
-                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x607F, 0), 0xBB8),
-                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x6080, 0), 0xBB8),
-                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x60C5, 0), 0x4E20),
-                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x6085, 0), 0x2710),
-                canmaster::network::ConfigWrite::u16(canmaster::id::Address::new(0x6007, 0), 0x3),
-            ],
-            sdo_timeout: Duration::from_millis(100),
-            configured: [0, 0],
+            name: "axis 5",
+            serial: Some(0x26000005),
+            kind: &KINDS[0],
         },
         Node {
             id: NodeId::constant::<6>(),
-            name: "axis 6",
             mandatory: true,
-            identity: Identity {
-                device_type: Some(0x00020192),
-                vendor: Some(0x000000FB),
-                product: Some(0x61500000),
-                revision: Some(0x01700000),
-                serial: Some(0x26000006),
-            },
-            heartbeat_ms: 100,
-            consumer_ms: 200,
-            rpdos: &[
-                canmaster::network::Pdo {
-                    number: 1,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
-                        canmaster::pdo::MappingEntry::new(0x60FF, 0, 32),
-                    ],
-                },
-                canmaster::network::Pdo {
-                    number: 2,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x6083, 0, 32),
-                        canmaster::pdo::MappingEntry::new(0x6084, 0, 32),
-                    ],
-                },
-                canmaster::network::Pdo {
-                    number: 3,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
-                        canmaster::pdo::MappingEntry::new(0x607A, 0, 32),
-                    ],
-                },
-                canmaster::network::Pdo {
-                    number: 4,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x6040, 0, 16),
-                        canmaster::pdo::MappingEntry::new(0x6071, 0, 16),
-                    ],
-                },
-            ],
-            tpdos: &[
-                canmaster::network::Pdo {
-                    number: 1,
-                    transmission: canmaster::pdo::Transmission::from_code(1),
-                    mapping: &[
-                        canmaster::pdo::MappingEntry::new(0x6041, 0, 16),
-                        canmaster::pdo::MappingEntry::new(0x6064, 0, 32),
-                    ],
-                },
-            ],
-            start_values: &[
-                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x6060, 0), 0x3),
-                canmaster::network::ConfigWrite::u8(canmaster::id::Address::new(0x60C2, 1), 0x2),
-                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x607F, 0), 0xBB8),
-                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x6080, 0), 0xBB8),
-                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x60C5, 0), 0x4E20),
-                canmaster::network::ConfigWrite::u32(canmaster::id::Address::new(0x6085, 0), 0x2710),
-                canmaster::network::ConfigWrite::u16(canmaster::id::Address::new(0x6007, 0), 0x3),
-            ],
-            sdo_timeout: Duration::from_millis(100),
-            configured: [0, 0],
+            name: "axis 6",
+            serial: Some(0x26000006),
+            kind: &KINDS[0],
         },
     ],
 };

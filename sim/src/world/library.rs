@@ -4,7 +4,7 @@
 
 use canmaster::NodeId;
 use canmaster::id::Address;
-use canmaster::network::{ConfigWrite, Identity, Master, Network, Node, Pdo};
+use canmaster::network::{ConfigWrite, Identity, Kind, Master, Network, Node, Pdo};
 use canmaster::pdo::{MappingEntry, Transmission};
 use canmaster::time::Duration;
 use canmaster_network::model::{self, Machine};
@@ -84,14 +84,21 @@ fn node(node: &model::Node) -> Result<Node, LibraryError> {
     let identity = &node.identity;
     Ok(Node {
         id: node_id(node.id)?,
-        name: node.name.clone().leak(),
         mandatory: node.mandatory,
+        name: node.name.clone().leak(),
+        serial: identity.serial,
+        kind: Box::leak(Box::new(kind(node)?)),
+    })
+}
+
+fn kind(node: &model::Node) -> Result<Kind, LibraryError> {
+    let identity = &node.identity;
+    Ok(Kind {
         identity: Identity {
             device_type: identity.device_type,
             vendor: identity.vendor,
             product: identity.product,
             revision: identity.revision,
-            serial: identity.serial,
         },
         heartbeat_ms: node.heartbeat_ms,
         consumer_ms: node.master_timeout_ms,

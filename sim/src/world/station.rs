@@ -88,7 +88,7 @@ fn described(node: &Node, motor: &Motor, bit_rate: u32, seed: u64) -> DriveConfi
         (wanted.vendor, &mut own.vendor),
         (wanted.product, &mut own.product),
         (wanted.revision, &mut own.revision),
-        (wanted.serial, &mut own.serial),
+        (node.serial, &mut own.serial),
     ] {
         *own = wanted.unwrap_or(*own);
     }

@@ -224,7 +224,7 @@ impl NodeBoot {
     /// If it does not boot, it is looked for before it is given up, should the
     /// network name its serial number.
     pub(super) const fn allow_search(&mut self, allowed: bool) {
-        self.search = allowed && self.node.identity.serial.is_some();
+        self.search = allowed && self.node.serial.is_some();
     }
 
     /// Nobody is looked for any more. Whether it is given up for that.

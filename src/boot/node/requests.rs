@@ -254,6 +254,6 @@ impl NodeBoot {
 
     /// What an entry of [`IDENTITY`] must be.
     fn expected(&self, item: u8) -> Option<u32> {
-        self.node.identity.number(item)
+        self.node.number(item)
     }
 }

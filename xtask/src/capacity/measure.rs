@@ -7,7 +7,7 @@ use canmaster::master::AxisPdos;
 use canmaster::motion::AxisCommand;
 use canmaster::motion::mode::Mode;
 use canmaster::network::sample::SIX_EPOS4;
-use canmaster::network::{self, Identity, Master, Network, Node, Pdo};
+use canmaster::network::{self, Identity, Kind, Master, Network, Node, Pdo};
 use canmaster::nmt::{Command, NodeControl, Target};
 use canmaster::pdo::{MappingEntry, Transmission};
 use canmaster::time::Duration;
@@ -172,24 +172,28 @@ const RPDOS: &[Pdo] = &[
 fn node(id: NodeId) -> Node {
     Node {
         id,
-        name: "drive",
         mandatory: true,
-        identity: Identity {
-            device_type: None,
-            vendor: None,
-            product: None,
-            revision: None,
-            serial: None,
-        },
-        heartbeat_ms: 0,
-        consumer_ms: 0,
-        rpdos: RPDOS,
-        tpdos: &[],
-        start_values: &[],
-        sdo_timeout: Duration::ZERO,
-        configured: [0; 2],
+        name: "drive",
+        serial: None,
+        kind: &RECEIVER,
     }
 }
+
+const RECEIVER: Kind = Kind {
+    identity: Identity {
+        device_type: None,
+        vendor: None,
+        product: None,
+        revision: None,
+    },
+    heartbeat_ms: 0,
+    consumer_ms: 0,
+    rpdos: RPDOS,
+    tpdos: &[],
+    start_values: &[],
+    sdo_timeout: Duration::ZERO,
+    configured: [0; 2],
+};
 
 fn pdo(row: &Row) -> Result<(u32, u32)> {
     const ANSWER_US: u64 = 200;

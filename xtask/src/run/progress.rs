@@ -189,7 +189,7 @@ fn reads(node: &network::Node) -> usize {
         identity.vendor,
         identity.product,
         identity.revision,
-        identity.serial,
+        node.serial,
     ]
     .iter()
     .flatten()
