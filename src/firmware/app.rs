@@ -25,7 +25,7 @@ mod app {
         axes::Axes,
         configurator::{Configurator, Parts},
         control::Control,
-        counters::{self, Counts},
+        counters::{self, Count},
         derived::{self, AXES, BUSES},
         filters, heartbeats, leds,
         lines::{self, Line, Lines, PRODUCING, SYNCS, Sender},
@@ -91,7 +91,6 @@ mod app {
         clock_us: timers::Microseconds,
         commands: [AxisCommand; AXES],
         axes: &'static mut Axes,
-        counts: Counts,
     }
 
     #[local]
@@ -125,6 +124,7 @@ mod app {
         news_to: Producer<'static, News>,
         heartbeat: nmt::Producer,
         asking: Asking,
+        counts: u32,
         asleep: u32,
         known_bus: can::ErrorState,
     }
@@ -182,7 +182,6 @@ mod app {
                 clock_us: board.microseconds,
                 commands: [AxisCommand::default(); AXES],
                 axes: configured_axes(cx.local.axes),
-                counts: Counts::default(),
             },
             Local {
                 period: board.period,
@@ -205,6 +204,7 @@ mod app {
                     news_to,
                     heartbeat: nmt::Producer::new(NETWORK.master.node),
                     asking: Asking::default(),
+                    counts: 0,
                     asleep: 0,
                     known_bus: can::ErrorState::Active,
                 },
@@ -394,7 +394,7 @@ mod app {
             if deadline.elapsed_us() > control.latest_us {
                 local.late = control.leads();
                 // What comes after the window of the SYNC is not sent any more.
-                counters::RPDO_REPLACED.add(1);
+                Count::RpdoReplaced.add(1);
                 axes.skip();
             } else if control.leads() && !control.bus_off {
                 if axes.write(&cycle, commands, &mut shared.lines) {
@@ -427,7 +427,7 @@ mod app {
         binds = TIM7,
         priority = 2,
         local = [network, supervisor],
-        shared = [od, lines, control, states, counts, &phase]
+        shared = [od, lines, control, states, &phase]
     )]
     fn network(mut cx: network::Context) {
         let network::LocalResources {
@@ -499,21 +499,22 @@ mod app {
                 .shared
                 .od
                 .lock(|od| (od.overruns(), od.take_wrong_length()));
-            let overflows = cx
-                .shared
-                .lines
-                .lock(|lines| lines.iter().map(|line| line.planned.overflows()).sum());
+            Count::CycleOverruns.set(overruns);
+            Count::TxOverflows.set(
+                cx.shared
+                    .lines
+                    .lock(|lines| lines.iter().map(|line| line.planned.overflows()).sum()),
+            );
             if measured::ON {
                 measured::second(&mut local.asleep, overruns);
                 publish(&mut local.news_to, News::Measured);
             }
-            let counts = Counts::now(overruns, wrong_length, overflows);
-            let new = cx.shared.counts.lock(|last| {
-                let new = counts != *last;
-                *last = counts;
-                new
-            });
-            if new {
+            if let Some(wrong) = wrong_length {
+                publish(&mut local.news_to, News::WrongLength(wrong));
+            }
+            let counts = counters::sum();
+            if counts != local.counts {
+                local.counts = counts;
                 publish(&mut local.news_to, News::Counts);
             }
         }
@@ -535,7 +536,7 @@ mod app {
     #[task(
         priority = 1,
         local = [configurator],
-        shared = [od, sender, lines, control, commands, axes, counts]
+        shared = [od, sender, lines, control, commands, axes]
     )]
     async fn sdo_configurator(cx: sdo_configurator::Context) {
         let mut wake = wake::reader();

@@ -4,7 +4,7 @@
 //! Answers need nothing done.
 
 use crate::{
-    counters,
+    counters::Count,
     derived::{AXES, AXIS_BUSES, BUSES, HEARTBEATS_IN_OPERATIONAL, NETWORK, SDO_EVERY},
     lines::{self, Lines, SYNCS},
 };
@@ -110,7 +110,7 @@ pub(crate) fn is_answer(frame: &Frame) -> bool {
     let at = objects::ERROR_REGISTER;
     let answer = [low, high] == at.index.0.to_le_bytes() && sub == at.sub.0;
     if answer {
-        counters::ANSWERS.add(1);
+        Count::Answers.add(1);
     }
     answer
 }

@@ -169,7 +169,6 @@ impl<'a> Configurator<'a> {
     fn listen(&mut self) -> bool {
         let now = self.now();
         let local = &mut self.local;
-        let counts = self.shared.counts.lock(|counts| *counts);
         while let Some(news) = local.news.dequeue() {
             if let Some(node) = news.cut_off_node() {
                 local.boot.node_cut_off(node, now);
@@ -177,8 +176,8 @@ impl<'a> Configurator<'a> {
             // Who is just being booted has to be silent for a while.
             let lost = news.lost_node();
             if lost.is_none_or(|node| local.boot.node_lost(node)) {
-                local.own.news(&news, &counts);
-                self.log.news(&news, &counts);
+                local.own.news(&news);
+                self.log.news(&news);
             }
         }
         while let Some(event) = self.shared.axes.lock(|axes| axes.group.take_event()) {

@@ -9,7 +9,7 @@
 
 use crate::measured;
 use crate::{
-    counters,
+    counters::Count,
     derived::{
         self, AXES, AXIS_BUSES, BUSES, CONTROLLERS, EARLY, FRAME_US, GUARD_US, NETWORK,
         ONE_PLANNED, SDO_NEXT_CYCLE,
@@ -63,7 +63,7 @@ impl Sender {
             return;
         };
         if waits || self.tx.transmit(buffers, &self.sync) == can::BUFFERS {
-            counters::SYNC_NOT_SENT.add(1);
+            Count::SyncNotSent.add(1);
         }
     }
 }
@@ -122,8 +122,10 @@ impl Line {
     }
 
     fn drop_late(&mut self, left: usize) {
-        counters::RPDO_REPLACED.add(left as u32);
-        self.late |= left != 0;
+        if left != 0 {
+            Count::RpdoReplaced.add(left as u32);
+            self.late = true;
+        }
     }
 
     /// An RPDO of every cycle, to be sent in its own or after the next SYNC.
@@ -138,7 +140,7 @@ impl Line {
     /// An RPDO on change.
     pub(crate) fn on_change(&mut self, frame: Frame) {
         if let Ok(Put::Replaced) = self.planned.put_latest(frame) {
-            counters::RPDO_REPLACED.add(1);
+            Count::RpdoReplaced.add(1);
         }
     }
 
@@ -312,7 +314,7 @@ pub(crate) fn refill(
                 *place = frame.id().get();
             } else {
                 // Two frames at most were there, and a SYNC: it cannot come to this.
-                counters::RPDO_REPLACED.add(1);
+                Count::RpdoReplaced.add(1);
             }
             measured::add_bits(bus, frame.dlc().into());
         }

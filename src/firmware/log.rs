@@ -2,11 +2,11 @@
 //! writes it: the others hand over what they have to say, so that no log line
 //! delays them and no two collide.
 
-use crate::{counters::Counts, measured};
+use crate::{counters::Count, measured};
 use canmaster::{
     NodeId,
     boot::Event,
-    master::{Notice, Report},
+    master::{Notice, Report, WrongLength},
     motion::{Cause, FaultCause, GroupEvent, GroupState},
     network::{Network, Node},
 };
@@ -35,8 +35,8 @@ enum Line<'a> {
     Silent(u32),
     NotStored,
     Controller(ErrorState),
-    Counts(&'a Counts),
-    Measured(u32, u32, u32, u32, u32, u32),
+    Counts,
+    Measured,
     Boot(&'a Event),
     Notice(&'a Notice),
     /// Of a node that the network does not name.
@@ -58,25 +58,25 @@ in_log!(Line<'_> {
         "settings are not stored (1010h): set option bit DBANK, then flash again"
     ),
     Line::Controller(state) => ("{}", Controller(state)),
-    Line::Counts(counts) => (
+    Line::Counts => (
         "so far: {} SYNC not sent, {} RPDO sent late or not, {} cycles overrun, {} frames not queued, {} receive overruns, {} receive queue full, {} TPDO too short, {} log lines lost",
-        counts.sync_not_sent,
-        counts.rpdo_replaced,
-        counts.cycle_overruns,
-        counts.tx_overflows,
-        counts.rx_overruns,
-        counts.rx_queue_full,
-        counts.tpdo_length,
-        counts.log_full
+        Count::SyncNotSent.get(),
+        Count::RpdoReplaced.get(),
+        Count::CycleOverruns.get(),
+        Count::TxOverflows.get(),
+        Count::RxOverruns.get(),
+        Count::RxQueueFull.get(),
+        Count::TpdoLength.get(),
+        Count::LogFull.get()
     ),
-    Line::Measured(jitter, cycle, step, bus, cpu, overruns) => (
+    Line::Measured => (
         "SYNC jitter {} us, cycle {} us, pdo_producer {} cycles, bus {} per mille, CPU {} per mille, {} overruns",
-        jitter,
-        cycle,
-        step,
-        bus,
-        cpu,
-        overruns
+        measured::entry(1),
+        measured::entry(3),
+        measured::entry(6),
+        measured::entry(8),
+        measured::entry(9),
+        measured::entry(10)
     ),
     Line::Boot(event) => ("{}", *event),
     Line::Notice(notice) => ("{}", *notice),
@@ -150,6 +150,8 @@ pub(crate) enum News {
     ErrorState(ErrorState),
     /// The counts have changed.
     Counts,
+    /// The last TPDO of wrong length since the one before.
+    WrongLength(WrongLength),
     /// A second is over.
     Measured,
 }
@@ -224,16 +226,13 @@ impl Log {
 
     /// What `network` had to say.
     #[inline(never)]
-    pub(crate) fn news(&mut self, news: &News, counts: &Counts) {
+    pub(crate) fn news(&mut self, news: &News) {
         let (level, line) = match news {
             News::Node(report) => return self.report(report),
-            News::Counts => (Level::Warning, Line::Counts(counts)),
-            News::Measured => {
-                let [jitter, cycle, step, bus, cpu, overruns] =
-                    [1, 3, 6, 8, 9, 10].map(measured::entry);
-                let line = Line::Measured(jitter, cycle, step, bus, cpu, overruns);
-                (Level::Debug, line)
-            }
+            News::Counts => (Level::Warning, Line::Counts),
+            // It is counted, too.
+            News::WrongLength(_) => return,
+            News::Measured => (Level::Debug, Line::Measured),
             News::ErrorState(state) => {
                 let level = match state {
                     ErrorState::BusOff => self.fault(),

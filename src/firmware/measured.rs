@@ -5,7 +5,7 @@
 //! it did not sleep.
 
 use crate::{
-    counters,
+    counters::Count,
     derived::{BUSES, NETWORK},
 };
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
@@ -147,8 +147,8 @@ pub(crate) fn entry(sub: u8) -> u32 {
         8 => get(Figure::Bits) * PER_MILLE / CYCLE_BITS,
         9 => LOAD.load(Relaxed),
         10 => OVERRUNS.load(Relaxed),
-        11 => counters::RPDO_REPLACED.get(),
-        12 => counters::SYNC_NOT_SENT.get(),
-        _ => counters::ANSWERS.get(),
+        11 => Count::RpdoReplaced.get(),
+        12 => Count::SyncNotSent.get(),
+        _ => Count::Answers.get(),
     }
 }

@@ -11,7 +11,7 @@
 use crate::{
     axes::Axes,
     control::Control,
-    counters::Counts,
+    counters::Count,
     derived::{self, AXES, PROGRAM, SYNC_LIMITS, TPDO_EVERY},
     log::News,
     measured,
@@ -307,7 +307,7 @@ impl OwnNode {
 
     /// What `network` had to say.
     #[inline(never)]
-    pub(crate) fn news(&mut self, news: &News, counts: &Counts) {
+    pub(crate) fn news(&mut self, news: &News) {
         match news {
             News::Node(report) => match report.notice {
                 Notice::Emcy { node, emcy } => self.device.on_emcy(node, emcy),
@@ -322,18 +322,20 @@ impl OwnNode {
             News::ErrorState(state) => self.error_state(*state),
             News::Measured => {}
             News::Counts => {
-                let lost = counts.rx_overruns.wrapping_add(counts.rx_queue_full);
+                let lost = Count::RxOverruns
+                    .get()
+                    .wrapping_add(Count::RxQueueFull.get());
                 if lost != self.lost_frames {
                     self.lost_frames = lost;
                     self.tell(MasterError::Overrun);
                 }
-                if let Some(WrongLength { slot, short }) = counts.wrong_length
-                    && let Some(node) = self.network.nodes.get(slot.axis())
-                {
+            }
+            News::WrongLength(WrongLength { slot, short }) => {
+                if let Some(node) = self.network.nodes.get(slot.axis()) {
                     self.tell(MasterError::PdoLength {
                         node: node.id,
                         tpdo: slot.number() as u8 + 1,
-                        short,
+                        short: *short,
                     });
                 }
             }

@@ -1,7 +1,8 @@
 //! What `can_irq` does with what it receives on one bus.
 
 use crate::{
-    asking, counters,
+    asking,
+    counters::Count,
     derived::{AXES, BUSES, CONTROLLERS},
     filters::{self, Handler},
     lines::{self, Line, Lines, PRODUCING, SYNCS, Sender},
@@ -51,7 +52,7 @@ impl Receiver {
         let flags = self.rx.take_flags(controller);
         if flags.rare() {
             if flags.message_lost() {
-                counters::RX_OVERRUNS.add(1);
+                Count::RxOverruns.add(1);
             }
             self.error_state(bus, sender, lines, states);
         }
@@ -123,7 +124,7 @@ impl Receiver {
         }) {
             Reception::Stored => {}
             Reception::Last => rtic::pend(Interrupt::TIM3),
-            Reception::TooShort => counters::TPDO_LENGTH.add(1),
+            Reception::TooShort => Count::TpdoLength.add(1),
         }
     }
 
@@ -156,6 +157,6 @@ impl Receiver {
 /// Hands a frame on; a full queue is counted.
 pub(crate) fn queue(to: &mut Producer<'static, Frame>, frame: Frame) {
     if to.enqueue(frame).is_err() {
-        counters::RX_QUEUE_FULL.add(1);
+        Count::RxQueueFull.add(1);
     }
 }

@@ -1,6 +1,6 @@
 //! How `network` hands on what it has to say.
 
-use crate::{control::Control, counters, log::News, wake};
+use crate::{control::Control, counters::Count, log::News, wake};
 use canmaster::master::Report;
 use heapless::spsc::Producer;
 
@@ -19,7 +19,7 @@ pub(crate) fn tell(
 /// Hands something to the log.
 pub(crate) fn publish(to: &mut Producer<'static, News>, news: News) {
     if to.enqueue(news).is_err() {
-        counters::LOG_FULL.add(1);
+        Count::LogFull.add(1);
     }
     wake::want();
 }
