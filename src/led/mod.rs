@@ -39,6 +39,7 @@ const FLICKER: Duration = Duration::from_millis(50);
 const BLINK: Duration = Duration::from_millis(200);
 /// The dark time after the last flash.
 const PAUSE: Duration = Duration::from_millis(1000);
+const PAUSE_SLOTS: u32 = PAUSE.as_micros() / BLINK.as_micros();
 
 impl Pattern {
     /// After which the pattern repeats; zero for on and off.
@@ -55,26 +56,22 @@ impl Pattern {
 
     /// Whether the LED is lit at `now`.
     pub const fn is_on(self, colour: Colour, now: Instant) -> bool {
-        let period = self.period().as_micros();
-        let phase = match period {
-            0 => 0,
-            // The lower half of the clock is enough: once in 71 minutes, when it
-            // starts again, one flash is cut short.
-            period => now.as_micros() as u32 % period,
-        };
-        let first_half = phase < period / 2;
-        match self {
-            Pattern::Off => false,
-            Pattern::On => true,
-            Pattern::Flickering | Pattern::Blinking => match colour {
-                Colour::Green => first_half,
-                Colour::Red => !first_half,
-            },
+        // In slots as long as a flash: how many there are, and where the flashes end.
+        let (length, slots, end) = match self {
+            Pattern::Off => (BLINK, 1, 0),
+            Pattern::On => (BLINK, 1, 1),
+            Pattern::Flickering => (FLICKER, 2, 2),
+            Pattern::Blinking => (BLINK, 2, 2),
             Pattern::Flashes(count) => {
-                let slot = phase / BLINK.as_micros();
-                slot < 2 * count as u32 && slot.is_multiple_of(2)
+                (BLINK, 2 * count as u32 + PAUSE_SLOTS - 1, 2 * count as u32)
             }
-        }
+        };
+        // The lower half of the clock is enough: once in 71 minutes, when it starts
+        // again, one flash is cut short.
+        let slot = now.as_micros() as u32 / length.as_micros() % slots;
+        // Red is lit when green is not, where half of the slots are.
+        let first = matches!((colour, slots), (Colour::Red, 2)) as u32;
+        slot < end && slot % 2 == first
     }
 }
 
