@@ -111,6 +111,8 @@ impl NodeBoot {
         settings: NodeSettings,
         boot_time: Duration,
     ) -> NodeBoot {
+        // Before the rest is made, which then is made in place.
+        let planned = network::plan(network, node).count() as u16;
         NodeBoot {
             network,
             node,
@@ -124,7 +126,7 @@ impl NodeBoot {
             guardian: Guardian::new(node.id, Duration::ZERO, 0),
             tries: 0,
             restarts: 0,
-            planned: u16::try_from(network::plan(network, node).count()).unwrap_or(u16::MAX),
+            planned,
             result: BootResult::Pending,
             gave_up: false,
             fresh: false,
