@@ -154,7 +154,8 @@ mod app {
         let (states_to, states) = cx.local.state_queue.split();
         let (news_to, news) = cx.local.news_queue.split();
         let (requests_to, requests) = cx.local.request_queue.split();
-        defmt::unwrap!(sdo_configurator::spawn().ok());
+        // The first can be; without it, it would be missing in the roll call.
+        let _ = sdo_configurator::spawn();
         let own = new_own_node(cx.local.own_place);
         let store = own.load(board.storage);
         let boot = new_boot(cx.local.boot_place, own);

@@ -173,6 +173,7 @@ impl NodeBoot {
         self.enter_until(state, self.attempt_end());
     }
 
+    #[inline(never)]
     fn attempt_end(&self) -> Instant {
         self.boot_end().max(self.now + ATTEMPT)
     }

@@ -345,6 +345,7 @@ impl NodeBoot {
     }
 
     /// How long it may take to boot.
+    #[inline(never)]
     fn boot_end(&self) -> Instant {
         match self.boot_deadline {
             Instant::NEVER => self.now + ATTEMPT,
