@@ -135,10 +135,9 @@ pub(crate) const INDEX: u16 = 0x2F20;
 
 /// The entry `sub` of 2F20h.
 pub(crate) fn entry(sub: u8) -> u32 {
-    let latest = get(Figure::Latest);
     match sub {
-        1 => (latest + get(Figure::Earliest)).saturating_sub(NEVER),
-        2 => latest,
+        1 => (get(Figure::Latest) + get(Figure::Earliest)).saturating_sub(NEVER),
+        2 => get(Figure::Latest),
         3 => get(Figure::Cycle),
         4 => get(Figure::SyncTick),
         5 => get(Figure::CanIrq),
