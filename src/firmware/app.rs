@@ -406,7 +406,7 @@ mod app {
                     measured::give(Figure::Cycle, shared.phase.elapsed_us());
                 }
             }
-            if axes.group.has_events() || axes.moves() || axes.pressed {
+            if axes.has_news() {
                 wake::want();
             }
         });

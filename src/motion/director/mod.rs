@@ -271,7 +271,9 @@ impl<const N: usize> Director<N> {
         }
         let mut plan = false;
         match self.phase {
-            Phase::Next | Phase::Path => self.patience = 1,
+            Phase::Next | Phase::Path | Phase::Finishing => self.patience = 1,
+            // Of an arrival there is an event, of an end of the reference none.
+            Phase::Arriving if self.flying => self.patience = 1,
             Phase::Waiting => self.patience = self.until.wrapping_sub(group.count()).max(1),
             Phase::Plan => {
                 self.patience = 1;

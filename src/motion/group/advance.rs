@@ -63,21 +63,20 @@ impl<const N: usize> Group<N> {
     fn stop(&mut self, fault: bool) {
         let Some(config) = self.config else { return };
         let led = self.here() & !self.excluded;
+        let mut speeds = [0.0; N];
         let mut fastest = 0.0;
-        for (n, (axis, config)) in self.axes.iter().zip(&config.axes).enumerate() {
+        let axes = self.axes.iter().zip(&config.axes).zip(&mut speeds);
+        for (n, ((axis, config), speed)) in axes.enumerate() {
             if led & bit(n) != 0 {
-                fastest = greater(fastest, axis.speed(fault, config).abs());
+                *speed = axis.speed(fault, config);
+                fastest = greater(fastest, speed.abs());
             }
         }
         let cycles = stop_cycles(fastest, config).max(1);
-        for (n, config) in config.axes.iter().enumerate() {
+        for (n, (config, speed)) in config.axes.iter().zip(speeds).enumerate() {
             let Some(axis) = self.axes.get_mut(n) else {
                 break;
             };
-            let mut speed = 0.0;
-            if led & bit(n) != 0 {
-                speed = axis.speed(fault, config);
-            }
             let slope = axis.stop(cycles, speed, config);
             if axis.seen & BY_POSITION != 0 {
                 self.set_ramps(n, slope, slope);

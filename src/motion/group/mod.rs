@@ -162,8 +162,11 @@ impl<const N: usize> Group<N> {
     /// Those of which all of `what` is seen.
     #[inline(never)]
     fn which(&self, what: Seen) -> Axes {
-        let join = |axes, axis: &Axis| axes << 1 | Axes::from(axis.seen & what == what);
-        self.axes.iter().rev().fold(0, join)
+        let mut axes = 0;
+        for axis in self.axes.iter().rev() {
+            axes = axes << 1 | Axes::from(axis.seen & what == what);
+        }
+        axes
     }
 
     /// All axes that are there.
