@@ -176,14 +176,18 @@ fn delaying_sync_tick_raises_the_jitter_by_as_much() {
         max_cycles: DELAY_CYCLES,
     };
     let shaken = run(Scenario::new(9, end).unattended().at(Time::ZERO, delay));
-    let raised = shaken.bus.jitter_pp_us - calm.bus.jitter_pp_us;
-    // Uniform delays do not all reach their limit, and a frame in the way (135
-    // bits at most) hides or adds a part.
+    let (calm, shaken) = (in_standby(&calm), in_standby(&shaken));
+    // Uniform delays do not all reach their limit.
     assert!(
-        (DELAY_US * 0.8..DELAY_US * 1.2).contains(&shaken.bus.jitter_pp_us)
-            || (raised - DELAY_US).abs() < 20.0,
-        "calm {} us, delayed {} us",
-        calm.bus.jitter_pp_us,
-        shaken.bus.jitter_pp_us
+        calm < 2.0 && (DELAY_US * 0.8..DELAY_US * 1.1).contains(&shaken),
+        "calm {calm} us, delayed {shaken} us"
     );
+}
+
+/// Jitter peak to peak in the second half of a run. Before, while the drives are
+/// started, a SYNC that is late may find a frame in its way.
+fn in_standby(record: &Record) -> f64 {
+    let all = &record.bus.sync_residuals_us;
+    let late = &all[all.len() / 2..];
+    late.iter().copied().fold(f64::MIN, f64::max) - late.iter().copied().fold(f64::MAX, f64::min)
 }
