@@ -269,7 +269,7 @@ fn a_program_is_downloaded_by_block_and_segmented_transfer_and_run() {
         client.write(program, &bytes, protocol).unwrap();
         assert_eq!(client.read(program, protocol), Ok(bytes.clone()));
     }
-    let long = vec![0; 1000];
+    let long = vec![0; panel::PROGRAM_BYTES + 1];
     let done = client.write(program, &long, Protocol::Block);
     assert!(matches!(done, Err(SdoError::Aborted { code, .. }) if code == AbortCode::TOO_LONG));
     let another = compiled(

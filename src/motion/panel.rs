@@ -55,7 +55,7 @@ pub const PROGRAM: u16 = 0x200F;
 pub const STEP: u16 = 0x2010;
 
 /// Bytes that a downloaded program may have.
-pub const PROGRAM_BYTES: usize = 512;
+pub const PROGRAM_BYTES: usize = 1024;
 /// The longest that a search for home, ordered by 2000h, may take.
 const HOMING: Duration = Duration::from_millis(60_000);
 

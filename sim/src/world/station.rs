@@ -8,6 +8,7 @@ use rand_pcg::Pcg64Mcg;
 
 use super::{Machine, Scenario};
 use crate::bus::{BitTiming, Bus, PortId};
+use crate::drive::travel::Travel;
 use crate::drive::{Drive, DriveConfig};
 use crate::time::Time;
 
@@ -82,6 +83,7 @@ fn described(node: &Node, motor: &Motor, bit_rate: u32, seed: u64) -> DriveConfi
     let mut config = DriveConfig::new(node.id, seed);
     config.bit_rate = bit_rate;
     config.plant.increments_per_turn = motor.increments_per_turn;
+    config.plant.travel = switches(node.id, motor.increments_per_turn);
     let (wanted, own) = (&node.identity, &mut config.identity);
     for (wanted, own) in [
         (wanted.device_type, &mut own.device_type),
@@ -93,6 +95,22 @@ fn described(node: &Node, motor: &Motor, bit_rate: u32, seed: u64) -> DriveConfi
         *own = wanted.unwrap_or(*own);
     }
     config
+}
+
+/// A home switch some turns above where the axis stands, elsewhere for each, and an
+/// index pulse a little below it.
+fn switches(node: NodeId, increments_per_turn: u32) -> Travel {
+    const FIRST: f64 = 1.5;
+    const APART: f64 = 0.3;
+    const LONG: f64 = 0.5;
+    const INDEX: f64 = 0.2;
+    let turn = f64::from(increments_per_turn);
+    let from = turn * (FIRST + APART * f64::from(node.get() % 8));
+    Travel {
+        home_switch: Some((from, from + LONG * turn)),
+        index_at: from - INDEX * turn,
+        ..Travel::default()
+    }
 }
 
 /// A drive without node-ID that no network is likely to name.

@@ -203,6 +203,7 @@ fn axis_truth(drive: &Drive) -> AxisTruth {
     let status = drive.status();
     AxisTruth {
         position: truth.position_inc,
+        actual: status.position,
         velocity: truth.velocity_rpm,
         operational: operational(&status),
         enabled: enabled(&status),

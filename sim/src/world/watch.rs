@@ -13,6 +13,11 @@ const FULL_MOTION_RPM: f64 = 300.0;
 /// (1016h: 200 ms; the SYNC after it).
 pub(super) const LAST_COMMAND: Time = Time::from_ms(250);
 
+/// 6061h: homing.
+const HOMING: i8 = 6;
+/// What an axis does to find its home counts as released, and as no move.
+const SEARCH: usize = usize::MAX;
+
 /// Whether this counts as full motion.
 pub(super) fn is_full_motion(velocity_rpm: f64) -> bool {
     velocity_rpm.abs() > FULL_MOTION_RPM
@@ -22,6 +27,8 @@ pub(super) fn is_full_motion(velocity_rpm: f64) -> bool {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct AxisTruth {
     pub(super) position: f64,
+    /// 6064h.
+    pub(super) actual: i32,
     pub(super) velocity: f64,
     pub(super) operational: bool,
     pub(super) enabled: bool,
@@ -99,7 +106,11 @@ impl Watch {
             let revoked = self.revoked_at.is_some_and(|since| at >= since);
             self.spent[axis] |= revoked && self.axes[axis].at_rest();
             let allowed = self.released && !self.spent[axis];
-            let release = allowed.then_some(self.releases.len());
+            let number = match truth.mode {
+                HOMING => SEARCH,
+                _ => self.releases.len(),
+            };
+            let release = allowed.then_some(number);
             self.axes[axis].sample(
                 TracePoint {
                     at,
@@ -109,6 +120,10 @@ impl Watch {
                 release,
             );
             let AxisTruth { state, mode, .. } = *truth;
+            let last = self.states[axis].last();
+            if mode != HOMING && last.is_some_and(|last| last.mode == HOMING) {
+                self.has_home(axis, truth);
+            }
             let last = self.states[axis].last();
             if last.is_none_or(|last| (last.state, last.mode) != (state, mode)) {
                 self.states[axis].push(AxisState { at, state, mode });
@@ -129,6 +144,15 @@ impl Watch {
         }
         self.full_motion |= all(|axis| is_full_motion(axis.velocity));
         self.finish_release(at)
+    }
+
+    /// After its search the moves of an axis count from where its drive shows 0.
+    fn has_home(&mut self, axis: usize, truth: &AxisTruth) {
+        let home = truth.position.round() as i64 - i64::from(truth.actual);
+        self.homes[axis] = home as i32;
+        if let Some(release) = self.releases.last_mut().filter(|_| self.released) {
+            release.homes[axis] = home as i32;
+        }
     }
 
     /// All drives are enabled and at rest.
@@ -239,6 +263,7 @@ mod tests {
     fn truth(position: f64, velocity: f64) -> Vec<Option<AxisTruth>> {
         vec![Some(AxisTruth {
             position,
+            actual: 0,
             velocity,
             operational: true,
             enabled: true,
@@ -345,5 +370,27 @@ mod tests {
         watch.sample(Time::from_ms(1), &all);
         assert!(!watch.ready());
         assert_eq!(watch.startup, Startup::default());
+    }
+
+    #[test]
+    fn a_search_for_home_is_no_move_and_its_end_is_the_new_home() {
+        let mut watch = Watch::new(vec![1]);
+        let at = |position: f64, velocity, mode, actual| {
+            let mut truth = truth(position, velocity);
+            let axis = truth[0].as_mut().unwrap();
+            (axis.mode, axis.actual) = (mode, actual);
+            truth
+        };
+        watch.sample(Time::from_ms(1), &at(10.0, 0.0, 3, 10));
+        watch.release(Time::from_ms(2));
+        for ms in 3..300 {
+            let velocity = if ms < 100 { 90.0 } else { 0.0 };
+            watch.sample(Time::from_ms(ms), &at(5000.0, velocity, HOMING, 20));
+        }
+        assert!(!watch.ready(), "its move is still to come");
+        watch.sample(Time::from_ms(300), &at(5000.2, 0.0, 3, 20));
+        assert_eq!(watch.releases[0].homes, [4980]);
+        assert!(one_move(&mut watch, 400));
+        assert_eq!(watch.axes[0].unreleased(), None);
     }
 }

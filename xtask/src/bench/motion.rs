@@ -3,7 +3,10 @@
 
 use std::time::Instant;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
+use canmaster::NodeId;
+use canmaster::id::Address;
+use canmaster::motion::{GroupState, panel};
 use canmaster_sim::board::irqs;
 use canmaster_sim::time::Time;
 use canmaster_sim::world::{Image, Scenario, World};
@@ -19,18 +22,61 @@ const READY_BY: Time = Time::from_ms(8000);
 /// What a round trip may take beyond the program's own time.
 const MARGIN: Time = Time::from_ms(1500);
 
-/// A mode, and how it is measured.
+/// A mode, and what is moved in it.
+#[derive(Clone, Copy)]
 struct Case {
     mode: &'static str,
-    /// From standby until the axes stand again.
-    moves: fn(&mut World<'_>) -> Result<()>,
+    /// 6060h.
+    code: i8,
+    task: Task,
 }
 
-/// The modes that the image has.
-const CASES: [Case; 1] = [Case {
-    mode: "profile velocity",
-    moves: round_trip,
-}];
+/// What the axes do while their steps are measured.
+#[derive(Clone, Copy)]
+enum Task {
+    /// The built-in program, released by the button.
+    Program,
+    /// A move that is ordered over CAN, and replaced on the way.
+    Move([i32; 2]),
+    /// A search for home by the method (6098h).
+    Home(u8),
+}
+
+const fn case(mode: &'static str, code: i8, task: Task) -> Case {
+    Case { mode, code, task }
+}
+
+/// Increments from home.
+const FAR: Task = Task::Move([20_000, -5_000]);
+/// Home is where the drive is.
+const HERE: u8 = 37;
+
+/// Every mode.
+const CASES: [Case; 6] = [
+    case("profile velocity", 3, Task::Program),
+    case("cyclic synchronous position", 8, FAR),
+    case("cyclic synchronous velocity", 9, FAR),
+    // Per mille of the rated torque.
+    case("cyclic synchronous torque", 10, Task::Move([30, -30])),
+    case("profile position", 1, FAR),
+    case("homing", 6, Task::Home(HERE)),
+];
+
+/// Profile velocity and acceleration of a move, rpm and rpm/s; of a torque per mille
+/// in a second.
+const VELOCITY: u32 = 1000;
+const ACCELERATION: u32 = 2000;
+/// Values of the group command and of the group state (`docs/motion.md`).
+const RELEASE: u16 = 3;
+const STOP: u16 = 4;
+const HOME: u16 = 8;
+const SET_MODES: u16 = 9;
+const START: u16 = 10;
+/// How long a command may take to have its effect.
+const PATIENCE: Time = Time::from_ms(3000);
+/// How long the first move is followed, and the one that replaces it.
+const FIRST: Time = Time::from_ms(400);
+const SECOND: Time = Time::from_ms(2500);
 
 /// What was measured in one mode.
 #[derive(Serialize)]
@@ -72,15 +118,23 @@ pub(super) fn run(image: &Image, seed: u64) -> Result<Outcome> {
 impl Case {
     fn measure(&self, image: &Image, seed: u64) -> Result<Mode> {
         let scenario = Scenario::new(seed, Time::MAX).unattended();
-        let mut world =
+        let world =
             World::new(image, scenario).context("the emulated board cannot boot this image")?;
+        let mut tool = Tool::new(world.with_guest());
         ensure!(
-            world.run_to(READY_BY, World::ready),
+            tool.world.run_to(READY_BY, World::ready),
             "not all drives were enabled after {READY_BY} s; see `cargo xtask run`"
         );
-        world.clear_stats();
-        (self.moves)(&mut world)?;
-        let stats = world.board().stats();
+        if self.code != PROFILE_VELOCITY {
+            tool.change_modes(self.code)?;
+        }
+        tool.world.clear_stats();
+        match self.task {
+            Task::Program => round_trip(&mut tool.world)?,
+            Task::Move(targets) => tool.moves(targets)?,
+            Task::Home(method) => tool.home(method)?,
+        }
+        let stats = tool.world.board().stats();
         let steps = stats.irq(irqs::TIM3).context("the axes were not stepped")?;
         Ok(Mode {
             mode: self.mode,
@@ -90,6 +144,9 @@ impl Case {
     }
 }
 
+/// The mode that the drives start in.
+const PROFILE_VELOCITY: i8 = 3;
+
 /// The program, released by the button.
 fn round_trip(world: &mut World<'_>) -> Result<()> {
     world.press();
@@ -98,6 +155,116 @@ fn round_trip(world: &mut World<'_>) -> Result<()> {
     ensure!(done, "the round trip did not end; see `cargo xtask run`");
     Ok(())
 }
+
+/// A tool on the bus that orders by SDO what the group does.
+struct Tool<'i> {
+    world: World<'i>,
+    board: NodeId,
+    nodes: Vec<NodeId>,
+}
+
+impl<'i> Tool<'i> {
+    fn new(world: World<'i>) -> Tool<'i> {
+        let network = world.machine().network();
+        Tool {
+            board: network.master.node,
+            nodes: network.nodes.iter().map(|node| node.id).collect(),
+            world,
+        }
+    }
+
+    fn write(&mut self, index: u16, sub: usize, data: &[u8]) -> Result<()> {
+        let at = Address::new(index, sub as u8);
+        let done = self.world.sdo_write(self.board, at, data);
+        done.with_context(|| format!("the board refuses {index:04X}h:{sub:02X}"))
+    }
+
+    fn command(&mut self, command: u16) -> Result<()> {
+        let Err(refused) = self.write(panel::COMMAND, 0, &command.to_le_bytes()) else {
+            return Ok(());
+        };
+        let why = self.number(panel::REFUSAL)?;
+        let why = why.iter().rev().map(|byte| format!("{byte:02X}"));
+        let why: String = why.collect();
+        let state = self.number(panel::STATE)?;
+        Err(refused).context(format!(
+            "command {command}: {why}h in 2002h, the group is in state {state:?}; see docs/motion.md"
+        ))
+    }
+
+    fn number(&mut self, index: u16) -> Result<Vec<u8>> {
+        let answer = self.world.sdo_read(self.board, Address::new(index, 0));
+        let answer = answer.with_context(|| format!("the board does not tell {index:04X}h"))?;
+        Ok(answer.data().to_vec())
+    }
+
+    /// Until the group is in a state.
+    fn until(&mut self, state: GroupState) -> Result<()> {
+        let limit = self.world.now() + PATIENCE;
+        while self.world.now() < limit {
+            if self.number(panel::STATE)? == [state as u8] {
+                return Ok(());
+            }
+        }
+        let found = self.number(panel::STATE)?;
+        let mut faults = Vec::new();
+        for axis in 1..=self.nodes.len() {
+            let at = Address::new(panel::FAULT, axis as u8);
+            let answer = self.world.sdo_read(self.board, at);
+            faults.push(answer.map(|answer| answer.data().to_vec()));
+        }
+        bail!(
+            "the group is not {state} after {PATIENCE} s but in state {found:?}; 200Eh: {faults:X?}"
+        )
+    }
+
+    fn change_modes(&mut self, code: i8) -> Result<()> {
+        self.until(GroupState::Standby)?;
+        for axis in 1..=self.nodes.len() {
+            self.write(panel::MODE, axis, &code.to_le_bytes())?;
+        }
+        self.command(SET_MODES)?;
+        let limit = self.world.now() + PATIENCE;
+        let done = self.world.run_to(limit, |world| {
+            world.statuses().flatten().all(|status| status.mode == code)
+        });
+        ensure!(done, "not all drives are in mode {code} after {PATIENCE} s");
+        self.until(GroupState::Standby)
+    }
+
+    fn moves(&mut self, targets: [i32; 2]) -> Result<()> {
+        for axis in 1..=self.nodes.len() {
+            self.write(panel::VELOCITY, axis, &VELOCITY.to_le_bytes())?;
+            self.write(panel::ACCELERATION, axis, &ACCELERATION.to_le_bytes())?;
+        }
+        self.command(RELEASE)?;
+        self.until(GroupState::Moving)?;
+        for (target, time) in targets.into_iter().zip([FIRST, SECOND]) {
+            for axis in 1..=self.nodes.len() {
+                self.write(panel::TARGET, axis, &target.to_le_bytes())?;
+            }
+            self.command(START)?;
+            self.world.run_until(self.world.now() + time);
+        }
+        self.until(GroupState::Moving)?;
+        self.command(STOP)?;
+        self.until(GroupState::Standby)
+    }
+
+    fn home(&mut self, method: u8) -> Result<()> {
+        let at = Address::new(HOMING_METHOD, 0);
+        for node in self.nodes.clone() {
+            let done = self.world.sdo_write(node, at, &[method]);
+            done.with_context(|| format!("node {} refuses the method", node.get()))?;
+        }
+        self.command(HOME)?;
+        self.world.run_until(self.world.now() + FIRST);
+        self.until(GroupState::Standby)
+    }
+}
+
+/// Homing method (CiA 402-2, 11.5).
+const HOMING_METHOD: u16 = 0x6098;
 
 impl Figures {
     fn missed(&self) -> Vec<String> {
