@@ -185,7 +185,8 @@ fn what_a_drive_lacks_or_a_missing_one_forbids_is_refused() {
     assert_eq!(state(&mut client), GroupState::Idle as u32);
     for order in [RELEASE, RUN] {
         let done = command(&mut client, order);
-        refused(&mut client, done, AbortCode::DEVICE_STATE, 0xFF01_0000);
+        // Axis 3 is missing.
+        refused(&mut client, done, AbortCode::DEVICE_STATE, 0x0304_0000);
     }
     assert!(
         !client

@@ -165,10 +165,19 @@ impl<const N: usize> NetworkBoot<N> {
     /// The nodes that are operational, as far as they told: bit n for the one at
     /// place n in the network.
     pub fn operational(&self) -> u32 {
+        self.which(Trait::OPERATIONAL)
+    }
+
+    /// The mandatory nodes that were given up, or not seen in their boot time, in the
+    /// same way: without them the network does not become ready.
+    pub fn missing(&self) -> u32 {
+        self.which(Trait::MANDATORY_FAILED)
+    }
+
+    #[inline(never)]
+    fn which(&self, what: Trait) -> u32 {
         let bits = self.nodes.iter().rev();
-        bits.fold(0, |bits, node| {
-            bits << 1 | u32::from(node.has(Trait::OPERATIONAL))
-        })
+        bits.fold(0, |bits, node| bits << 1 | u32::from(node.has(what)))
     }
 
     /// Whether a node of the list was given up, or not seen in its boot time.

@@ -90,7 +90,10 @@ impl Axes {
                 && !control.cycle_differs,
             fault: control.fault.or(late),
             passed: cycle.passed,
-            absent: !control.operational,
+            absent: match control.network_ready {
+                true => !control.operational,
+                false => control.missing,
+            },
         };
         self.group.step(&inputs, &self.feedback, commands);
     }

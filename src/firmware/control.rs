@@ -19,6 +19,8 @@ pub struct Control {
     pub(crate) network_ready: bool,
     /// The nodes that are operational: bit n for axis n.
     pub(crate) operational: u32,
+    /// The mandatory nodes that the network cannot do without, and has to.
+    pub(crate) missing: u32,
     /// A node was given up: it counts as lost, even if it was never seen.
     pub(crate) node_missing: bool,
     /// The button was pressed.
@@ -48,6 +50,7 @@ impl Control {
             started: false,
             network_ready: false,
             operational: 0,
+            missing: 0,
             node_missing: false,
             pressed: false,
             fault: None,
@@ -76,6 +79,7 @@ impl Control {
     pub(crate) fn follow(&mut self, boot: &NetworkBoot<AXES>) {
         self.network_ready = boot.is_ready();
         self.operational = boot.operational();
+        self.missing = boot.missing();
         self.node_missing = boot.any_given_up();
         self.boot_failed = boot.is_failed();
         self.speaking |= !boot.is_silent();

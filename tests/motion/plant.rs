@@ -75,6 +75,8 @@ pub(crate) struct Drive {
     pub(crate) velocity: f64,
     /// The shaft does not turn, whatever the torque.
     pub(crate) blocked: bool,
+    /// Something turns the shaft at this speed, rpm, whatever the torque.
+    pub(crate) pushed: Option<f64>,
     /// The state machine never leaves this state.
     pub(crate) stuck: Option<State>,
 }
@@ -105,6 +107,7 @@ impl Drive {
             homeless: false,
             velocity: 0.0,
             blocked: false,
+            pushed: None,
             stuck: None,
         }
     }
@@ -293,6 +296,11 @@ impl Drive {
     fn turn(&mut self, torque: f64) {
         const PARTS: u32 = 4;
         let dt = STEP_S / f64::from(PARTS);
+        if let Some(speed) = self.pushed {
+            self.velocity = speed;
+            self.position += speed * PER_RPM * STEP_S;
+            return;
+        }
         if self.blocked {
             self.velocity = 0.0;
         }

@@ -54,7 +54,8 @@ pub struct Inputs {
     /// Level: all mandatory nodes are checked, configured and operational.
     pub network_ready: bool,
     /// Level: bit n leaves out axis n, whose optional node is not there. One that
-    /// goes in motion is a fault; one that comes waits for standby.
+    /// goes in motion is a fault; one that comes waits for standby. While the network
+    /// is not ready: the axes that it misses.
     pub absent: u32,
     /// Edge: a fault seen elsewhere, with the axis counted from 0; a number that no
     /// axis has: of all.

@@ -81,6 +81,11 @@ impl<const N: usize> Group<N> {
             return Ok(());
         }
         if cell(self.state, event) == Cell::Refuse {
+            let missing = self.absent & (bit(N) - 1);
+            if !self.network_ready && missing != 0 {
+                why.axis = missing.trailing_zeros() as u8;
+                return why.because(Reason::Network, 0, 1);
+            }
             return why.state(self.state);
         }
         match order {
