@@ -158,7 +158,7 @@ fn steps_have_the_lines_that_they_come_from() {
     let lines: Vec<Option<u32>> = (0..=10).map(|step| program.line_of(step)).collect();
     let lines: Vec<u32> = lines.into_iter().map(|line| line.unwrap_or(0)).collect();
     // Homing is three steps, a loop its steps and its end.
-    assert_eq!(lines, [0, 8, 8, 8, 12, 14, 18, 20, 24, 12, 0]);
+    assert_eq!(lines, [0, 9, 9, 9, 13, 15, 19, 21, 25, 13, 0]);
 }
 
 #[test]
@@ -177,6 +177,8 @@ fn the_course_knows_every_rest() {
             vec![0; 6]
         ]
     );
+    let all = course.rests.iter().flatten().flatten();
+    assert!(all.into_iter().all(|stop| stop.sure));
     let homing = of_project("homing.toml").course(&group);
     assert_eq!(homing.rests.len(), 4);
     assert!(homing.rests.iter().all(|rest| rest[2].is_none()));

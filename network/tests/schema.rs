@@ -118,7 +118,12 @@ fn the_reference_explains_every_key() {
     for (name, toml, _, heading) in tables() {
         let section = reference
             .split("\n## ")
-            .find(|section| section.contains(heading))
+            .find(|section| {
+                section
+                    .lines()
+                    .next()
+                    .is_some_and(|line| line.contains(heading))
+            })
             .unwrap();
         for key in known(&toml) {
             assert!(section.contains(&format!("`{key}`")), "{name}: {key}");

@@ -8,6 +8,7 @@ use canmaster::motion::{GroupState, panel};
 use canmaster::sdo::{AbortCode, Protocol, SdoError};
 use canmaster::{CobId, Frame, NodeId};
 use canmaster_network::Source;
+use canmaster_sim::judge::coordination;
 use canmaster_sim::time::Time;
 use canmaster_sim::world::{Client, Scenario, World, enabled};
 
@@ -169,6 +170,97 @@ fn a_mode_is_changed_at_standstill_and_confirmed() {
     client.listen(Time::from_ms(1500));
     assert!(client.heard_from(0x201).is_empty());
     arrived(&mut client, &from, 5000);
+    // All six start with one SYNC and arrive with one SYNC. In whole increments the
+    // shorter ways are seen to begin a little later, and to end a little earlier.
+    let mut target = 5000;
+    for (longer, apart) in [(0, 0), (3000, 4)] {
+        target += 12_000;
+        for axis in 1..=AXES {
+            let to = target + longer * u32::from(axis);
+            client.put(panel::TARGET, axis, to, 4).unwrap();
+        }
+        command(&mut client, START).unwrap();
+        client.listen(Time::from_ms(2500));
+        let wire = [client.world.wire()];
+        let network = client.world.machine().network();
+        let spans = coordination::spans(wire.into_iter(), network);
+        let last = &spans[spans.len() - usize::from(AXES)..];
+        for span in last {
+            let (start, end) = (last[0].start.sync, last[0].end.sync);
+            let axis = span.axis;
+            assert!(span.start.sync.abs_diff(start) <= apart, "axis {axis}");
+            assert!(span.end.sync.abs_diff(end) <= apart, "axis {axis}");
+        }
+        let mut all: Vec<usize> = last.iter().map(|span| span.axis).collect();
+        all.sort_unstable();
+        assert_eq!(all, [0, 1, 2, 3, 4, 5]);
+    }
+    // A stop brings it back to standby.
+    command(&mut client, STOP).unwrap();
+    until(&mut client, GroupState::Standby);
+}
+
+/// Set-points of profile position mode: counted from the one before, one after the
+/// other, and one that replaces another.
+#[test]
+fn profile_position_is_relative_buffered_and_immediate() {
+    let mut client = in_standby(47);
+    let program = |settle: bool| {
+        compiled(&format!(
+            "unit = \"turns\"\nvelocity = 1000\nacceleration = 2000\n\
+             [[step]]\n[step.mode]\nis = \"profile position\"\n\
+             [[step]]\nsettle = {settle}\n[[step.move]]\nby = [1, -1, 2, -2, 1, 1]\n\
+             [[step]]\n[[step.move]]\nby = [2, -1, 1, -1, 1, -3]\n"
+        ))
+    };
+    let ways = [3, -2, 3, -3, 2, -2];
+    let mut from = positions(&mut client);
+    for settle in [true, false] {
+        let at = Address::new(panel::PROGRAM, 0);
+        client.write(at, &program(settle), Protocol::Block).unwrap();
+        command(&mut client, RUN).unwrap();
+        let mut standby = 0;
+        for _ in 0..800 {
+            client.listen(Time::from_ms(10));
+            standby = match state(&mut client) == GroupState::Standby as u32 {
+                true => standby + 1,
+                false => 0,
+            };
+            if standby > 20 {
+                break;
+            }
+        }
+        assert!(standby > 20, "{}", state(&mut client));
+        let now = positions(&mut client);
+        for ((from, now), way) in from.iter().zip(&now).zip(ways) {
+            let off = now - from - 2000 * way;
+            assert!(off.abs() <= 5, "{off} beside {way} turns, settle {settle}");
+        }
+        from = now;
+    }
+    assert!(
+        client
+            .world
+            .statuses()
+            .flatten()
+            .all(|status| status.mode == 1)
+    );
+    // Replaced on the way: never where the first one led to.
+    command(&mut client, RELEASE).unwrap();
+    until(&mut client, GroupState::Moving);
+    put_targets(&mut client, 40_000);
+    command(&mut client, START).unwrap();
+    client.listen(Time::from_ms(300));
+    put_targets(&mut client, 10_000);
+    command(&mut client, START).unwrap();
+    let mut farthest = 0;
+    for _ in 0..300 {
+        client.listen(Time::from_ms(10));
+        farthest = farthest.max(positions(&mut client)[0]);
+    }
+    assert!(farthest < 30_000, "{farthest}");
+    command(&mut client, STOP).unwrap();
+    until(&mut client, GroupState::Standby);
 }
 
 #[test]

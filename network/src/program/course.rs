@@ -19,8 +19,8 @@ const STEPS_MAX: usize = 100_000;
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Course {
-    /// Rests, one after the other: for each axis that came there since the last,
-    /// where it has to be.
+    /// Rests, one after the other: for each axis that a step has moved, where it has to
+    /// be.
     pub rests: Vec<Vec<Option<Stop>>>,
     /// How long it takes, in SYNC cycles.
     pub cycles: u64,
@@ -37,6 +37,8 @@ pub struct Stop {
     /// Axes with the same number do the same, and stop together to be seen: of two
     /// that arrive together, the one that goes less far is slow before.
     pub set: u8,
+    /// It is seen to rest there; else the next step may begin at once.
+    pub sure: bool,
 }
 
 /// Numbers for what is alike, from 1.
@@ -60,7 +62,7 @@ struct Walk<'a> {
     course: Course,
     at: Vec<i64>,
     modes: Vec<u8>,
-    /// Since the last rest.
+    /// In this step.
     moved: Vec<Option<Stop>>,
     left: usize,
 }
@@ -83,11 +85,21 @@ impl Program {
 }
 
 impl Walk<'_> {
-    /// Whoever moved since the last rest is seen to rest.
-    fn rest(&mut self) {
+    /// A step has ended.
+    fn pass(&mut self) {
         if self.moved.iter().any(Option::is_some) {
             let moved = std::mem::replace(&mut self.moved, vec![None; self.at.len()]);
             self.course.rests.push(moved);
+        }
+    }
+
+    /// Whoever has moved is seen to rest.
+    fn rest(&mut self) {
+        for axis in 0..self.at.len() {
+            let mut rests = self.course.rests.iter_mut().rev();
+            if let Some(last) = rests.find_map(|rest| rest[axis].as_mut()) {
+                last.sure = true;
+            }
         }
     }
 
@@ -99,6 +111,7 @@ impl Walk<'_> {
             self.moved[axis] = Some(Stop {
                 target: to as i32,
                 set,
+                sure: false,
             });
         }
         self.at[axis] = to;
@@ -127,6 +140,7 @@ impl Walk<'_> {
                     let set = alike.number((part.set, (to - at).abs()));
                     self.go(part.axis, to, set);
                 }
+                self.pass();
                 self.course.cycles += u64::from(cycles) + SETTLING_CYCLES;
             }
             Action::Wait { cycles } => {
@@ -156,8 +170,10 @@ impl Walk<'_> {
                     self.go(of.axis, to, set);
                     // It moved, wherever it ends.
                     let target = self.at[of.axis] as i32;
-                    self.moved[of.axis] = Some(Stop { target, set });
+                    let sure = false;
+                    self.moved[of.axis] = Some(Stop { target, set, sure });
                 }
+                self.pass();
             }
             Action::Home { axes, limit } => {
                 self.rest();

@@ -182,24 +182,37 @@ impl Board {
     /// The task of interrupt `irq` never ends: until the next reset its handler
     /// begins with a branch to itself.
     pub fn spin_irq(&mut self, irq: u8) {
+        /// `b .`
+        const BRANCH_TO_ITSELF: Code = [0xFE, 0xE7];
+        self.begin_with(irq, BRANCH_TO_ITSELF);
+    }
+
+    /// The task of interrupt `irq` ends as a panic does: until the next reset its
+    /// handler begins with an undefined instruction.
+    pub fn crash_irq(&mut self, irq: u8) {
+        /// `udf #0`
+        const UNDEFINED: Code = [0x00, 0xDE];
+        self.begin_with(irq, UNDEFINED);
+    }
+
+    fn begin_with(&mut self, irq: u8, instruction: Code) {
         /// Exceptions of the core come first in the vector table.
         const FIRST: u32 = 16;
         const VECTOR_BYTES: u32 = 4;
         /// Of a vector: Thumb code.
         const THUMB: u32 = 1;
-        /// `b .`
-        const BRANCH_TO_ITSELF: Code = [0xFE, 0xE7];
         let vector = FLASH_BASE + (FIRST + u32::from(irq)) * VECTOR_BYTES;
         let Some(handler) = self.memory.word(vector).map(|entry| entry & !THUMB) else {
             return;
         };
         let mut code = Code::default();
-        if self.memory.read(handler, &mut code) && self.memory.patch(handler, &BRANCH_TO_ITSELF) {
+        if self.memory.read(handler, &mut code) && self.memory.patch(handler, &instruction) {
             self.spinning.push((handler, code));
         }
     }
 
-    /// Puts back what [`spin_irq`](Self::spin_irq) has taken away.
+    /// Puts back what [`spin_irq`](Self::spin_irq) and [`crash_irq`](Self::crash_irq)
+    /// have taken away.
     pub(super) fn stop_spinning(&mut self) {
         for (handler, code) in self.spinning.drain(..).rev() {
             // It could be written before.

@@ -2,8 +2,11 @@
 
 use canmaster::NodeId;
 
-use super::axis::AxisMonitor;
+use super::axis::{AxisMonitor, Movement};
 use crate::time::Time;
+
+/// So near to a place where it may rest, in increments, an axis rests there.
+const NEAR: i64 = 50;
 
 /// What one move asks of one axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -12,6 +15,8 @@ pub struct Part {
     pub target: i32,
     /// Axes of one set start and stop together.
     pub set: u8,
+    /// It is seen to rest there; else its next part may begin at once.
+    pub sure: bool,
 }
 
 /// What the firmware's program asks of the axes.
@@ -72,6 +77,30 @@ pub struct Arrival {
     pub stopped: Time,
 }
 
+/// Which of its `parts` an axis at `home` has made with each of its movements. One that
+/// ends at no place between is the next that is sure.
+pub fn matched<'m>(
+    movements: impl Iterator<Item = &'m Movement>,
+    parts: &[(usize, Part)],
+    home: i32,
+) -> Vec<(&'m Movement, usize, Part)> {
+    let mut left = parts;
+    let mut all = Vec::new();
+    for movement in movements.filter(|movement| movement.settled) {
+        let sure = left.iter().position(|(_, part)| part.sure);
+        let next = &left[..sure.map_or(left.len(), |sure| sure + 1)];
+        let near = |part: &Part| movement.error(home.wrapping_add(part.target)) <= NEAR;
+        let made = next.iter().position(|(_, part)| near(part));
+        let made = made.unwrap_or(next.len().saturating_sub(1));
+        let Some(&(step, part)) = left.get(made) else {
+            break;
+        };
+        all.push((movement, step, part));
+        left = &left[made + 1..];
+    }
+    all
+}
+
 /// All arrivals in the order of their releases, moves and axes.
 pub fn arrivals(
     nodes: &[NodeId],
@@ -92,20 +121,19 @@ pub fn arrivals(
             let Some(&home) = release.homes.get(axis) else {
                 continue;
             };
-            for (movement, (step, part)) in movements.zip(assignment.of_axis(axis)) {
+            let parts: Vec<(usize, Part)> = assignment.of_axis(axis).collect();
+            for (movement, step, part) in matched(movements, &parts, home) {
                 let target = home.wrapping_add(part.target);
-                if movement.settled {
-                    all.push(Arrival {
-                        node,
-                        axis,
-                        release: number,
-                        step,
-                        set: part.set,
-                        target,
-                        error: movement.error(target),
-                        stopped: movement.stopped,
-                    });
-                }
+                all.push(Arrival {
+                    node,
+                    axis,
+                    release: number,
+                    step,
+                    set: part.set,
+                    target,
+                    error: movement.error(target),
+                    stopped: movement.stopped,
+                });
             }
         }
     }
@@ -152,7 +180,16 @@ mod tests {
     }
 
     fn assignment() -> Assignment {
-        let both = |target| vec![Some(Part { target, set: 1 }); 2];
+        let both = |target| {
+            vec![
+                Some(Part {
+                    target,
+                    set: 1,
+                    sure: true
+                });
+                2
+            ]
+        };
         Assignment {
             moves: vec![both(20_000), both(0)],
             cycle: Time::from_ms(10),
@@ -199,6 +236,38 @@ mod tests {
             worst_pair(&all),
             Some((Time::from_ms(4), nodes[0], nodes[1]))
         );
+    }
+
+    #[test]
+    fn where_the_next_step_begins_at_once_an_axis_may_rest_or_not() {
+        let part = |target, sure| Part {
+            target,
+            set: 1,
+            sure,
+        };
+        let parts = [
+            part(500, false),
+            part(900, false),
+            part(200, true),
+            part(0, true),
+        ];
+        let parts: Vec<(usize, Part)> = parts.into_iter().enumerate().collect();
+        let steps = |stops: &[f64]| -> Vec<usize> {
+            let mut axis = AxisMonitor::default();
+            let mut from = 100.0;
+            for (n, to) in (1..).zip(stops) {
+                drive(&mut axis, 2000 * n, from, *to, 1);
+                from = *to;
+            }
+            let movements = axis.movements().iter();
+            let matched = matched(movements, &parts, 100);
+            matched.into_iter().map(|(_, step, _)| step).collect()
+        };
+        assert_eq!(steps(&[300.0, 100.0]), [2, 3]);
+        assert_eq!(steps(&[600.0, 1000.0, 300.0, 100.0]), [0, 1, 2, 3]);
+        assert_eq!(steps(&[1003.0, 300.0]), [1, 2]);
+        // Nowhere: beside the next that is sure.
+        assert_eq!(steps(&[750.0, 100.0, 400.0]), [2, 3]);
     }
 
     #[test]

@@ -13,6 +13,9 @@ const NMT: u16 = 0x000;
 const SYNC: u16 = 0x080;
 const TPDO1: u16 = 0x180;
 const RPDO1: u16 = 0x200;
+/// In its place where the mode wants another target.
+const RPDO3: u16 = 0x400;
+const RPDO4: u16 = 0x500;
 const ERROR_CONTROL: u16 = 0x700;
 
 /// NMT commands (CiA 301, 7.3.2.2.1).
@@ -199,7 +202,7 @@ impl<'t> Judge<'t> {
                 let nodes = self.traffic.nodes.iter().zip(&mut self.nodes);
                 for (node, seen) in nodes {
                     let node = u16::from(node.get());
-                    if id == RPDO1 + node {
+                    if [RPDO1, RPDO3, RPDO4].contains(&id.wrapping_sub(node)) {
                         seen.rpdo1 = true;
                     } else if id == TPDO1 + node {
                         seen.tpdo1 = true;

@@ -14,7 +14,7 @@ pub mod sdo;
 pub mod skew;
 pub mod verdict;
 
-pub use arrivals::{Arrival, Assignment, Part, Release, arrivals, worst_pair};
+pub use arrivals::{Arrival, Assignment, Part, Release, arrivals, matched, worst_pair};
 pub use axis::{AxisMonitor, Movement, STANDSTILL_RPM, TracePoint};
 pub use bus::{BusFigures, Traffic};
 pub use contract::{Cause, Limit, Limits, Reaction};

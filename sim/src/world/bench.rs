@@ -32,6 +32,7 @@ impl World<'_> {
             Stimulus::Hang { irq } => self.board.hang_irq(irq),
             Stimulus::Resume { irq } => self.board.resume_irq(irq),
             Stimulus::Spin { irq } => self.board.spin_irq(irq),
+            Stimulus::Crash { irq } => self.board.crash_irq(irq),
             Stimulus::DelayIrq { irq, max_cycles } => {
                 self.board.delay_irq(irq, max_cycles, self.scenario.seed);
             }

@@ -184,6 +184,7 @@ fn course(program: &Program, group: &Group) -> Moves {
         stop.map(|stop| Part {
             target: stop.target,
             set: stop.set,
+            sure: stop.sure,
         })
     };
     // One that does not end is never seen to have ended.

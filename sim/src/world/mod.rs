@@ -134,7 +134,7 @@ impl<'i> World<'i> {
         }
         let assignment = machine.assignment();
         let moves = (0..stations.len())
-            .map(|axis| assignment.of_axis(axis).count())
+            .map(|axis| assignment.of_axis(axis).collect())
             .collect();
         let mut agenda = Agenda::default();
         for (at, stimulus) in &scenario.stimuli {

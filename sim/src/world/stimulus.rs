@@ -33,6 +33,12 @@ pub enum Stimulus {
         /// Its number.
         irq: u8,
     },
+    /// The next task that an interrupt of the board starts ends in a hard fault, as a
+    /// panic does.
+    Crash {
+        /// Its number.
+        irq: u8,
+    },
     /// An interrupt of the board is taken late.
     DelayIrq {
         /// Its number.
@@ -69,6 +75,7 @@ impl Stimulus {
             Stimulus::Power(false) => "board without supply".into(),
             Stimulus::Hang { irq } => format!("interrupt {irq} hangs"),
             Stimulus::Spin { irq } => format!("interrupt {irq} never ends"),
+            Stimulus::Crash { irq } => format!("interrupt {irq} crashes"),
             Stimulus::Silence { node } => format!("node {} silent", node.get()),
             Stimulus::Drive { node, fault } => {
                 format!("node {}: {}", node.get(), words(fault))

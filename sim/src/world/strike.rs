@@ -6,7 +6,10 @@ use std::fmt;
 
 use canmaster::NodeId;
 use canmaster::emcy::{Emcy, EmcyCode, ErrorRegister};
+use canmaster::id::Address;
+use canmaster::motion::panel;
 use canmaster::nmt::{Command, NodeControl};
+use canmaster::sdo::SdoError;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -278,10 +281,10 @@ impl Strike {
             }
             Cause::MasterHangs => {
                 let irq = TASKS[self.kind % TASKS.len()];
-                if self.kind < 2 * TASKS.len() {
-                    Stimulus::Hang { irq }
-                } else {
-                    Stimulus::Spin { irq }
+                match self.kind / TASKS.len() {
+                    0 => Stimulus::Hang { irq },
+                    1 => Stimulus::Spin { irq },
+                    _ => Stimulus::Crash { irq },
                 }
             }
         };
@@ -428,6 +431,7 @@ impl Strike {
         must(world, world.at_rest(), "an axis turns again")?;
         nothing_moved_unasked(world)?;
         let ready = world.ready();
+        refuses(world, ready)?;
         world.press();
         if !ready {
             world.run_until(world.now() + WATCHED);
@@ -477,6 +481,22 @@ struct Stopping {
     slow_at: Option<Time>,
     /// When it was last seen to turn.
     turned: Option<Time>,
+}
+
+/// A command that cannot be carried out is refused, with a reason: a move without a
+/// release, or a release of a machine that is not ready.
+fn refuses(world: &mut World<'_>, ready: bool) -> Result<(), TrialError> {
+    const RELEASE: u16 = 3;
+    const START: u16 = 10;
+    let command = if ready { START } else { RELEASE };
+    let board = world.machine().network().master.node;
+    let at = Address::new(panel::COMMAND, 0);
+    let done = world.sdo_write(board, at, &command.to_le_bytes());
+    let refused = matches!(done, Err(SdoError::Aborted { .. }));
+    must(world, refused, &format!("command {command}: {done:?}"))?;
+    let why = world.sdo_read(board, Address::new(panel::REFUSAL, 0));
+    let told = why.is_ok_and(|why| why.data().iter().any(|byte| *byte != 0));
+    must(world, told, "the board does not say why it refuses")
 }
 
 fn nothing_moved_unasked(world: &World<'_>) -> Result<(), TrialError> {

@@ -2,7 +2,7 @@
 //! has come home.
 
 use crate::drive::cia402::State;
-use crate::judge::{AxisMonitor, Release, TracePoint};
+use crate::judge::{AxisMonitor, Part, Release, TracePoint, matched};
 use crate::time::Time;
 
 /// Full motion: all axes turn faster than this, rpm.
@@ -66,7 +66,7 @@ pub(super) struct Watch {
     /// What each drive was in, from change to change.
     pub(super) states: Vec<Vec<AxisState>>,
     /// Moves of one round trip, by axis.
-    moves: Vec<usize>,
+    moves: Vec<Vec<(usize, Part)>>,
     homes: Vec<i32>,
     enabled: Vec<bool>,
     /// Motion is allowed under the newest release.
@@ -80,7 +80,7 @@ pub(super) struct Watch {
 }
 
 impl Watch {
-    pub(super) fn new(moves: Vec<usize>) -> Watch {
+    pub(super) fn new(moves: Vec<Vec<(usize, Part)>>) -> Watch {
         let axes = moves.len();
         Watch {
             axes: vec![AxisMonitor::default(); axes],
@@ -234,19 +234,14 @@ impl Watch {
             self.released = self.revoked_at.is_some_and(|since| at < since);
             return false;
         }
-        let made = |axis: &AxisMonitor| {
-            axis.movements()
-                .iter()
-                .filter(|movement| movement.release == number)
-                .count()
-        };
-        if self
-            .axes
-            .iter()
-            .zip(&self.moves)
-            .any(|(axis, &moves)| made(axis) < moves)
-        {
-            return false;
+        let axes = self.axes.iter().zip(&self.moves).zip(&release.homes);
+        for ((axis, parts), home) in axes {
+            let movements = axis.movements().iter();
+            let movements = movements.filter(|movement| movement.release == number);
+            let last = matched(movements, parts, *home).last().map(|made| made.1);
+            if last != parts.last().map(|part| part.0) {
+                return false;
+            }
         }
         release.done = Some(at);
         let took = at - release.at;
@@ -272,6 +267,16 @@ mod tests {
         })]
     }
 
+    /// So many moves, wherever they lead.
+    fn moves(count: usize) -> Vec<(usize, Part)> {
+        let part = Part {
+            target: 40,
+            set: 1,
+            sure: true,
+        };
+        (0..count).map(|step| (step, part)).collect()
+    }
+
     /// 200 ms of motion and 300 ms of rest; whether a round trip was finished.
     fn one_move(watch: &mut Watch, start_ms: u64) -> bool {
         (0..500).fold(false, |done, ms| {
@@ -282,7 +287,7 @@ mod tests {
 
     #[test]
     fn a_round_trip_is_all_moves_and_rest() {
-        let mut watch = Watch::new(vec![2]);
+        let mut watch = Watch::new(vec![moves(2)]);
         watch.sample(Time::from_ms(1), &truth(10.7, 0.0));
         assert!(watch.ready());
         assert_eq!(watch.startup.enabled, Some(Time::from_ms(1)));
@@ -304,7 +309,7 @@ mod tests {
 
     #[test]
     fn a_revoked_release_ends_with_standstill() {
-        let mut watch = Watch::new(vec![2]);
+        let mut watch = Watch::new(vec![moves(2)]);
         watch.sample(Time::from_ms(1), &truth(0.0, 0.0));
         watch.release(Time::from_ms(2));
         watch.sample(Time::from_ms(3), &truth(0.0, 500.0));
@@ -318,7 +323,7 @@ mod tests {
 
     #[test]
     fn an_axis_at_rest_must_not_start_while_another_still_coasts() {
-        let mut watch = Watch::new(vec![2, 2]);
+        let mut watch = Watch::new(vec![moves(2); 2]);
         let both = |a, b| [truth(0.0, a), truth(0.0, b)].concat();
         watch.sample(Time::from_ms(1), &both(0.0, 0.0));
         watch.release(Time::from_ms(2));
@@ -336,7 +341,7 @@ mod tests {
 
     #[test]
     fn what_was_told_before_the_revocation_may_still_start() {
-        let mut watch = Watch::new(vec![2]);
+        let mut watch = Watch::new(vec![moves(2)]);
         watch.sample(Time::from_ms(1), &truth(0.0, 0.0));
         watch.release(Time::from_ms(2));
         watch.revoke(Time::from_ms(50));
@@ -347,7 +352,7 @@ mod tests {
 
     #[test]
     fn an_order_allows_motion_until_the_next_stop() {
-        let mut watch = Watch::new(vec![2]);
+        let mut watch = Watch::new(vec![moves(2)]);
         watch.sample(Time::from_ms(1), &truth(0.0, 0.0));
         watch.release_by_order(Time::from_ms(2));
         for start_ms in [10, 1000, 2000] {
@@ -364,7 +369,7 @@ mod tests {
 
     #[test]
     fn a_missing_drive_keeps_the_machine_from_being_ready() {
-        let mut watch = Watch::new(vec![2, 2]);
+        let mut watch = Watch::new(vec![moves(2); 2]);
         let mut all = truth(0.0, 0.0);
         all.push(None);
         watch.sample(Time::from_ms(1), &all);
@@ -374,7 +379,7 @@ mod tests {
 
     #[test]
     fn a_search_for_home_is_no_move_and_its_end_is_the_new_home() {
-        let mut watch = Watch::new(vec![1]);
+        let mut watch = Watch::new(vec![moves(1)]);
         let at = |position: f64, velocity, mode, actual| {
             let mut truth = truth(position, velocity);
             let axis = truth[0].as_mut().unwrap();

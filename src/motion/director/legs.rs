@@ -102,7 +102,7 @@ impl<const N: usize> Director<N> {
                 group.set_ramps(axis, leg.acceleration, leg.deceleration);
                 let set_point = SetPoint {
                     target: leg.target,
-                    immediately: true,
+                    immediately: !self.after,
                     relative: false,
                 };
                 if !group.ask(axis, &set_point) {

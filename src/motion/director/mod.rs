@@ -67,6 +67,8 @@ pub struct Director<const N: usize> {
     /// A path is to be checked, not a move to be planned.
     path: bool,
     flying: bool,
+    /// The step before did not wait: a drive that moves by itself finishes it first.
+    after: bool,
     number: u16,
     config: Option<&'static GroupConfig<N>>,
     /// Where the step that runs begins, and the next one.
@@ -95,6 +97,7 @@ impl<const N: usize> Director<N> {
         running: false,
         path: false,
         flying: false,
+        after: false,
         number: 0,
         at: 0,
         next: 0,
@@ -225,7 +228,7 @@ impl<const N: usize> Director<N> {
                 set?;
             }
         }
-        (self.path, self.flying) = (false, false);
+        (self.path, self.flying, self.after) = (false, false, false);
         self.phase = Phase::Plan;
         Ok(())
     }
@@ -368,6 +371,7 @@ impl<const N: usize> Director<N> {
             let step = self.number.wrapping_sub(1) as u8;
             group.report(GroupEvent::StepStarted { step });
         }
+        self.after = self.flying;
         self.flying = step.has(FLYING);
         self.path = step.kind == format::PATH;
         self.phase = match step.kind {

@@ -287,6 +287,12 @@ impl Axis {
         self.over = 0;
     }
 
+    /// Its drive leads it to `position` by itself.
+    pub(super) fn end_at(&mut self, position: i32) {
+        self.path.restart(&Point::at_rest(position));
+        self.over = 0;
+    }
+
     /// The drive's ramps for what follows, rpm/s.
     pub(super) fn set_ramps(&mut self, up: f32, down: f32) {
         self.up = up as u32;

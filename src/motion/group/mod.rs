@@ -300,6 +300,8 @@ impl<const N: usize> Group<N> {
             && axis.led.is_taken();
         if can {
             axis.led.ask(set_point);
+            // What comes next counts from there.
+            axis.end_at(set_point.target);
             self.busy |= bit;
         }
         can

@@ -96,7 +96,6 @@ impl<const N: usize> Group<N> {
             _ if self.ordered.event().is_some() => return why.busy(),
             _ => self.permit(order, why)?,
         }
-        self.unwanted |= event == Event::QuickStop;
         self.ordered = order;
         Ok(())
     }
@@ -164,6 +163,7 @@ impl<const N: usize> Group<N> {
         }
         let order = core::mem::replace(&mut self.ordered, Order::Enable);
         let Some(event) = order.event() else { return };
+        self.unwanted |= event == Event::QuickStop;
         let before = self.state;
         if !self.happen(event) {
             // Something came in between.
