@@ -2,8 +2,6 @@
 
 import time
 
-import canopen
-
 from machine import MASTER, PATIENCE, OnTheBus, await_frame, number, u32
 
 COMMAND = 0x2000
@@ -39,6 +37,8 @@ class Group(OnTheBus):
     def setUp(self):
         super().setUp()
         self.board = self.node(MASTER)
+        # Nobody answers before.
+        self.await_state(self.board, "OPERATIONAL")
         self.until_state(STANDBY)
 
     def put(self, index, sub, value):
@@ -53,11 +53,9 @@ class Group(OnTheBus):
 
     def until_state(self, wanted):
         until = time.monotonic() + PATIENCE
+        state = None
         while time.monotonic() < until:
-            try:
-                state = self.state()
-            except canopen.SdoCommunicationError:
-                continue
+            state = self.state()
             if state == wanted:
                 return
         self.fail(f"the group is in state {state}, not {wanted}")
