@@ -110,7 +110,8 @@ fn a_sine_is_short() {
     assert!(path.shared && path.points.len() <= 64);
     assert_eq!(path.periods, 2);
     let cycles: u32 = path.points.iter().map(|p| u32::from(p.cycles)).sum();
-    assert_eq!(cycles, 180);
+    // 180 points, four SYNCs apart.
+    assert_eq!(cycles, 4 * 180);
     // Half a period after the start it is twice the amplitude away.
     let half = &path.points[path.points.len() / 2 - 1];
     assert!(
