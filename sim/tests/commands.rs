@@ -200,6 +200,39 @@ fn a_mode_is_changed_at_standstill_and_confirmed() {
     until(&mut client, GroupState::Standby);
 }
 
+/// No drive misses its target on the way, whichever mode it leaves or enters.
+#[test]
+fn from_every_mode_to_every_other() {
+    const MODES: [u8; 6] = [1, 3, 6, 8, 9, 10];
+    let mut tour = Vec::new();
+    for (n, from) in MODES.into_iter().enumerate() {
+        for to in &MODES[n + 1..] {
+            tour.extend([from, *to]);
+        }
+    }
+    tour.push(MODES[0]);
+    let mut client = in_standby(44);
+    client.take_heard();
+    for mode in tour {
+        for axis in 1..=AXES {
+            client.put(panel::MODE, axis, mode.into(), 1).unwrap();
+        }
+        command(&mut client, SET_MODES).unwrap();
+        client.listen(Time::from_ms(50));
+        until(&mut client, GroupState::Standby);
+        let modes = client.world.statuses().flatten();
+        assert!(
+            modes
+                .map(|status| status.mode)
+                .all(|shown| shown == mode as i8)
+        );
+        let heard = client.take_heard();
+        let emergency = |(_, frame): &&(Time, Frame)| (0x081..0x100).contains(&frame.id().get());
+        let said: Vec<_> = heard.iter().filter(emergency).collect();
+        assert!(said.is_empty(), "mode {mode}: {said:?}");
+    }
+}
+
 /// Set-points of profile position mode: counted from the one before, one after the
 /// other, and one that replaces another.
 #[test]

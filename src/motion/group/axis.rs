@@ -334,22 +334,26 @@ impl Axis {
         self.over.saturating_sub(AHEAD)
     }
 
-    /// The mode whose RPDO is sent: the new one while the mode is being changed.
-    fn sent_mode(&self) -> Mode {
-        self.wanted.unwrap_or(self.mode())
+    /// The mode whose RPDO is sent. While the mode is being changed nobody knows in
+    /// which the drive is, and in both it may want a target every other cycle at least
+    /// (60C2h): then the RPDOs of both go by turns.
+    fn sent_mode(&self, count: u32) -> Mode {
+        let turn = count & 1 == 0;
+        self.wanted.filter(|_| turn).unwrap_or(self.mode())
     }
 
-    /// Fills in what is sent with the controlword `word`.
+    /// Fills in what is sent in cycle `count` with the controlword `word`.
     #[inline(never)]
     pub(super) fn command(
         &mut self,
+        count: u32,
         word: u16,
         lead: Lead,
         config: &AxisConfig,
         tuning: &Tuning,
         out: &mut AxisCommand,
     ) {
-        let mode = self.sent_mode();
+        let mode = self.sent_mode(count);
         let end = match lead {
             Lead::Actual if self.feedback.fresh => self.feedback.position,
             Lead::Actual => self.target,

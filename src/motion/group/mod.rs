@@ -28,9 +28,9 @@ use heapless::Deque;
 /// Events kept until they are taken: enough for the busiest step, in which every
 /// one of six axes fails.
 const EVENTS: usize = 24;
-/// Cycles in which every drive has the target of a new mode before the mode is
-/// written.
-const TARGET_SETTLED: u32 = 3;
+/// Cycles before a mode is written: in every other of them the target of the new mode
+/// is sent.
+const TARGET_SETTLED: u32 = 4;
 /// So many missed cycles the references are followed up in one step. After more the
 /// group is stopped anyway.
 const CAUGHT_UP_MAX: u32 = 8;
@@ -402,7 +402,7 @@ impl<const N: usize> Group<N> {
                     axis.seen |= REACHED;
                 }
             }
-            axis.command(word.0, led, limits, &config.tuning, out);
+            axis.command(self.count, word.0, led, limits, &config.tuning, out);
         }
     }
 

@@ -5,6 +5,9 @@
 
 /// For how many periods a set value counts.
 const PERIODS: f64 = 2.0;
+/// A control cycle of the drive: what ends the gap comes with a SYNC that may be late
+/// by its jitter and by the drive's own clock.
+const CONTROL_CYCLE_S: f64 = 0.0004;
 
 /// The set value between two of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -71,7 +74,7 @@ impl Interpolation {
 
     /// With this period in 60C2h, no set value has come for too long.
     pub fn overdue(&self, now_s: f64, period_s: f64) -> bool {
-        period_s > 0.0 && now_s - self.start_s > PERIODS * period_s
+        period_s > 0.0 && now_s - self.start_s > PERIODS * period_s + CONTROL_CYCLE_S
     }
 }
 
