@@ -5,10 +5,12 @@ use std::hint::black_box;
 
 use canmaster::motion::experiment::GROUP;
 use canmaster::motion::{
-    AxisCommand, AxisFeedback, AxisMove, Director, FaultCause, Group, GroupState, Inputs, Order,
+    AxisCommand, AxisFeedback, AxisMove, Cause, Director, Group, GroupState, Inputs, Order,
 };
 
 const AXES: usize = 6;
+/// A bit for each of them.
+const ALL: u32 = (1 << AXES) - 1;
 /// Increments that an axis goes in a cycle of 10 ms at 3 rpm: 2000 a turn.
 const STEP_INC: i32 = 1;
 const STEP_RPM: i32 = 3;
@@ -76,7 +78,7 @@ fn recorded() -> Vec<Step> {
         steps.push(Step {
             inputs: Inputs {
                 network_ready: at >= NETWORK_UP,
-                fault: (at == FAULT).then_some((0, FaultCause::HeartbeatLost)),
+                fault: (at == FAULT).then_some((0, Cause::HeartbeatLost.alone())),
                 absent: 0,
                 passed: 1,
             },
@@ -121,8 +123,7 @@ impl Run {
         while self.group.take_event().is_some() {}
         let released = step.order == Some(Order::Release);
         if released && self.group.state() == GroupState::Moving {
-            let parts = [Some(FAR); AXES];
-            let _ = self.director.go(&self.group, &parts, false, 0);
+            let _ = self.director.go(&self.group, ALL, &[FAR; AXES], 0);
             self.director.round(&mut self.group, &[]);
         }
     }

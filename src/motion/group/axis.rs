@@ -274,12 +274,15 @@ impl Axis {
         fixed::round(self.path.position())
     }
 
-    /// At rest where it is: the next release starts there. A torque rests at 0.
+    /// At rest where it is: the next release starts there. A torque rests at 0; while
+    /// the mode is being changed the path is one of positions, which no path of a
+    /// torque leads to.
     #[inline(never)]
     pub(super) fn hold_actual(&mut self) {
-        let position = match self.sent_mode() {
-            Mode::CyclicTorque => 0,
-            _ if self.feedback.fresh => self.feedback.position,
+        let changes = self.wanted.is_some();
+        let position = match self.mode() {
+            Mode::CyclicTorque if !changes => 0,
+            _ if self.feedback.fresh || changes => self.feedback.position,
             _ => fixed::round(self.sample(END).position),
         };
         self.samples = [Sample::at_rest(position); RING];
