@@ -57,6 +57,8 @@ pub(crate) struct Drive {
     pub(crate) mode: Mode,
     target: AxisCommand,
     pending: AxisCommand,
+    /// What each RPDO has brought: the drive obeys the object of its mode.
+    objects: [i32; 4],
     demand: f64,
     model: f64,
     integral: f64,
@@ -95,6 +97,7 @@ impl Drive {
             word: ControlWord(0),
             target: AxisCommand::default(),
             pending: AxisCommand::default(),
+            objects: [0; 4],
             demand: 0.0,
             model: 0.0,
             integral: 0.0,
@@ -133,16 +136,11 @@ impl Drive {
             torque: 0,
             fresh: true,
         };
-        // Only the target of the mode that the drive is in is taken over.
-        let same = self.pending.mode.rpdo() == self.mode.rpdo();
         self.last = self.aim();
         self.over = 0.0;
+        self.objects[usize::from(self.pending.mode.rpdo())] = self.pending.target;
         self.target = AxisCommand {
-            target: if same {
-                self.pending.target
-            } else {
-                self.target.target
-            },
+            target: self.objects[usize::from(self.mode.rpdo())],
             ..self.pending
         };
         let before = self.word;
@@ -158,7 +156,7 @@ impl Drive {
         self.mode = mode;
         self.answered = false;
         self.going = None;
-        self.target = self.pending;
+        self.target.target = self.objects[usize::from(mode.rpdo())];
         self.last = f64::from(self.target.target);
         self.over = 1.0;
     }
