@@ -165,6 +165,14 @@ impl Path {
         self.first = first + (self.second >> (MORE + 1));
     }
 
+    /// One cycle on, which is known to be within a ramp; where that is.
+    pub(super) fn glide(&mut self) -> i64 {
+        self.position = self.position.wrapping_add(self.first);
+        self.first += self.second >> MORE;
+        self.to.cycles -= 1;
+        self.position
+    }
+
     /// As at a knot.
     fn stand_at(&mut self, position: i64, velocity: i64) {
         self.position = position;

@@ -319,6 +319,10 @@ impl Axis {
     #[inline(never)]
     pub(super) fn stop(&mut self, cycles: u32, speed: f32, config: &AxisConfig) -> f32 {
         self.over = 0;
+        if self.seen & BY_DRIVE != 0 {
+            // Its path stands where it is.
+            return 0.0;
+        }
         let position = self.sample(NEXT).position;
         let mut velocity = config.scale.velocity(speed);
         if self.mode() == Mode::CyclicTorque {
@@ -327,9 +331,24 @@ impl Axis {
             velocity = TWICE * fixed::float(position) / cycles as f32;
         }
         self.path.brake(position, velocity, cycles);
-        self.look(END);
-        self.look(AHEAD);
-        velocity.abs() / cycles as f32
+        let slope = velocity / cycles as f32;
+        for ahead in NEXT..AHEAD {
+            // All axes stop in one step: this is shorter than to look.
+            if cycles < AHEAD {
+                self.look(ahead + 1);
+                continue;
+            }
+            velocity -= slope;
+            let position = self.path.glide();
+            if let Some(place) = self.samples.get_mut(place(self.count, ahead + 1)) {
+                *place = Sample {
+                    position,
+                    velocity,
+                    acceleration: -slope,
+                };
+            }
+        }
+        slope.abs()
     }
 
     /// How long it has waited to come to rest since its path ended, in cycles.
