@@ -23,6 +23,9 @@ const TARGET_VELOCITY: u16 = 0x60FF;
 const TARGET_TORQUE: u16 = 0x6071;
 /// A torque that counts as none, per mille: below it friction holds the axis.
 const NO_TORQUE: i64 = 5;
+/// An axis that is told another position moves if it is told yet another within so many
+/// SYNCs: a held one may be an increment off.
+const NEXT_POSITION: usize = 10;
 
 /// A SYNC that was on the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,6 +62,8 @@ struct Axis {
     next: Option<Target>,
     /// Is followed since the last SYNC.
     present: Option<Target>,
+    /// The last other position.
+    other: Option<Edge>,
 }
 
 /// All spans on all buses, in the order of their starts.
@@ -94,16 +99,16 @@ fn on_bus(wire: &[WireRecord], network: &Network) -> Vec<Span> {
             at: record.sof,
         };
         for (n, (axis, open)) in axes.iter_mut().zip(&mut open).enumerate() {
-            if !axis.sync() {
+            let Some(start) = axis.sync(edge) else {
                 continue;
-            }
+            };
             match open {
-                Some(span) if sync - span.end.sync <= pause => span.end = edge,
+                Some(span) if start.sync <= span.end.sync + pause => span.end = edge,
                 _ => {
                     done.extend(open.take());
                     *open = Some(Span {
                         axis: n,
-                        start: edge,
+                        start,
                         end: edge,
                     });
                 }
@@ -115,16 +120,20 @@ fn on_bus(wire: &[WireRecord], network: &Network) -> Vec<Span> {
 }
 
 impl Axis {
-    /// The set value counts; whether the axis is to move.
-    fn sync(&mut self) -> bool {
+    /// The set value counts; since when the axis is to move, if it is.
+    fn sync(&mut self, now: Edge) -> Option<Edge> {
         let before = self.present;
         self.present = self.next.take().or(before);
-        match (self.present, before) {
-            (Some(Target::Position(now)), Some(Target::Position(before))) => now != before,
-            (Some(Target::Velocity(now)), _) => now.abs() as f64 > STANDSTILL_RPM,
-            (Some(Target::Torque(now)), _) => now.abs() > NO_TORQUE,
+        let moves = match (self.present, before) {
+            (Some(Target::Position(to)), Some(Target::Position(before))) if to != before => {
+                let other = self.other.replace(now);
+                return other.filter(|other| now.sync - other.sync <= NEXT_POSITION);
+            }
+            (Some(Target::Velocity(to)), _) => to.abs() as f64 > STANDSTILL_RPM,
+            (Some(Target::Torque(to)), _) => to.abs() > NO_TORQUE,
             _ => false,
-        }
+        };
+        moves.then_some(now)
     }
 }
 
@@ -249,6 +258,32 @@ mod tests {
         wire.push(record(16, 0x181, &[1; 6]));
         wire.push(record(20, SYNC, &[]));
         assert!(spans(&wire).is_empty());
+    }
+
+    #[test]
+    fn a_position_that_is_corrected_once_is_no_movement() {
+        let frame = |ms: u64, position: i32| {
+            let mut data = vec![0x0F, 0x00];
+            data.extend_from_slice(&position.to_le_bytes());
+            record(ms, RPDO1 + 2 * RPDO_STEP + 1, &data)
+        };
+        let positions = [7, 7, 8, 8, 8, 9, 12, 16, 16, 16];
+        let cycle = |(n, position): (u64, &i32)| {
+            let ms = 10 * (n + 20 * u64::from(n > 3));
+            [record(ms, SYNC, &[]), frame(ms + 3, *position)]
+        };
+        let numbered = (0..).zip(&positions);
+        let mut wire: Vec<WireRecord> = numbered.flat_map(cycle).collect();
+        // Twenty SYNCs more after the first four.
+        let more = (4..24).map(|n| record(10 * n, SYNC, &[]));
+        wire.splice(8..8, more);
+        let network = &canmaster::network::sample::SIX_EPOS4;
+        let found = super::spans([wire.as_slice()].into_iter(), network);
+        let numbers: Vec<_> = found
+            .iter()
+            .map(|span| (span.axis, span.start.sync, span.end.sync))
+            .collect();
+        assert_eq!(numbers, [(0, 27, 29)]);
     }
 
     #[test]
