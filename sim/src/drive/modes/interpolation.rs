@@ -89,8 +89,8 @@ mod tests {
         assert!((i.value(1.001) - 105.0).abs() < 1e-9);
         assert!((i.value(1.002) - 110.0).abs() < 1e-9);
         assert!((i.slope(1.001) - 5000.0).abs() < 1e-6);
-        assert!(!i.overdue(1.0039, 0.002));
-        assert!(i.overdue(1.0041, 0.002));
+        assert!(!i.overdue(1.0043, 0.002));
+        assert!(i.overdue(1.0045, 0.002));
         assert!((i.value(2.0) - 120.0).abs() < 1e-9, "one period more");
         assert_eq!(i.slope(2.0), 0.0);
     }
