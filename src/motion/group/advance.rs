@@ -205,7 +205,7 @@ impl<const N: usize> Group<N> {
     /// After a quick stop or a fault: waits for standstill, for as long as an axis
     /// may take. Axes that report nothing are not waited for.
     fn comes_to_rest(&mut self, config: &GroupConfig<N>) -> bool {
-        let mut moving = self.here() & !(self.which(AT_REST) | self.which(SILENT));
+        let mut moving = self.here() & self.matching(AT_REST | SILENT, 0);
         if moving == 0 {
             return true;
         }

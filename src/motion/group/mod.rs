@@ -160,11 +160,16 @@ impl<const N: usize> Group<N> {
     }
 
     /// Those of which all of `what` is seen.
-    #[inline(never)]
     fn which(&self, what: Seen) -> Axes {
+        self.matching(what, what)
+    }
+
+    /// Those of which, of `mask`, exactly `what` is seen.
+    #[inline(never)]
+    fn matching(&self, mask: Seen, what: Seen) -> Axes {
         let mut axes = 0;
         for axis in self.axes.iter().rev() {
-            axes = axes << 1 | Axes::from(axis.seen & what == what);
+            axes = axes << 1 | Axes::from(axis.seen & mask == what);
         }
         axes
     }
@@ -377,16 +382,13 @@ impl<const N: usize> Group<N> {
         let (command, lead) = sent(self.state);
         // Quick stop leaves a drive that is braking by itself on its ramp and cannot
         // enable anything.
-        let mut left = 0;
-        if lead == Some(Lead::Fault) {
-            left = self.excluded | self.which(BY_DRIVE);
-        }
+        let fault = lead == Some(Lead::Fault);
         let axes = self.axes.iter_mut().zip(&config.axes).zip(out);
         for (n, ((axis, limits), out)) in axes.enumerate() {
             let (mut led, mut word) = (Lead::Rest, ControlWord::new(command));
             if self.absent & bit(n) != 0 {
                 word = ControlWord::new(Command::DisableVoltage);
-            } else if left & bit(n) != 0 {
+            } else if fault && (self.excluded & bit(n) != 0 || axis.seen & BY_DRIVE != 0) {
                 word = ControlWord::new(Command::QuickStop);
             } else if let Some(lead) = lead {
                 led = lead;

@@ -117,7 +117,7 @@ impl<const N: usize> Group<N> {
 
     /// Axes whose drives have left operation enabled, each reported once.
     fn exclude_lost_axes(&mut self) {
-        let mut lost = self.which(HEARD) & !(self.which(ENABLED) | self.coasting);
+        let mut lost = self.matching(HEARD | ENABLED, HEARD) & !self.coasting;
         self.coasting |= lost;
         self.excluded |= lost;
         while let Some(n) = next(&mut lost) {
