@@ -25,12 +25,24 @@ pub(super) const fn round(x: i64) -> i32 {
 /// hardware can.
 #[inline(never)]
 pub(super) const fn float(x: i64) -> f32 {
+    float_here(x)
+}
+
+/// The same, where every cycle counts.
+#[inline(always)]
+pub(super) const fn float_here(x: i64) -> f32 {
     (x >> BITS) as i32 as f32 + x as u32 as f32 * (1.0 / ONE)
 }
 
 /// `x`, below 2^31, in 2^-32.
 #[inline(never)]
 pub(super) fn fixed(x: f32) -> i64 {
+    fixed_here(x)
+}
+
+/// The same, where every cycle counts.
+#[inline(always)]
+pub(super) fn fixed_here(x: f32) -> i64 {
     let whole = x as i32;
     let rest = ((x - whole as f32) * REST) as i32;
     ((whole as i64) << BITS).wrapping_add((rest as i64) << 1)
@@ -39,6 +51,12 @@ pub(super) fn fixed(x: f32) -> i64 {
 /// `x`, below 2^19, in 2^-44.
 pub(super) fn fine(x: f32) -> i64 {
     fixed(x * MORE_ONE)
+}
+
+/// The same, where every cycle counts.
+#[inline(always)]
+pub(super) fn fine_here(x: f32) -> i64 {
+    fixed_here(x * MORE_ONE)
 }
 
 /// `x / by`, rounded toward zero; `by` below 2^24. Eight bits at a time.

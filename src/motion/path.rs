@@ -146,11 +146,11 @@ impl Path {
 
     /// Forgets everything: comes to rest from `velocity`, in increments per cycle, in
     /// so many cycles.
-    #[inline(never)]
+    #[inline(always)]
     pub(super) fn brake(&mut self, position: i64, velocity: f32, cycles: u32) {
         self.len = 0;
         self.next = 0;
-        let first = fixed::fixed(velocity);
+        let first = fixed::fixed_here(velocity);
         let way = (first >> 1).wrapping_mul(i64::from(cycles));
         self.position = position;
         self.to = Knot {
@@ -160,12 +160,13 @@ impl Path {
         };
         self.acceleration = -velocity / cycles as f32;
         self.jerk = 0.0;
-        self.second = fixed::fine(self.acceleration);
+        self.second = fixed::fine_here(self.acceleration);
         self.third = 0;
         self.first = first + (self.second >> (MORE + 1));
     }
 
     /// One cycle on, which is known to be within a ramp; where that is.
+    #[inline(always)]
     pub(super) fn glide(&mut self) -> i64 {
         self.position = self.position.wrapping_add(self.first);
         self.first += self.second >> MORE;
@@ -291,7 +292,7 @@ impl Path {
     pub fn sample(&self) -> Sample {
         Sample {
             position: self.position,
-            velocity: fixed::float(self.first) - self.bent(),
+            velocity: fixed::float_here(self.first) - self.bent(),
             acceleration: self.acceleration,
         }
     }
@@ -308,7 +309,7 @@ impl Path {
     }
 
     /// The same, without a look at where that is.
-    #[inline(never)]
+    #[inline(always)]
     pub(super) fn go_on(&mut self) {
         if self.to.cycles == 0 {
             self.begin();

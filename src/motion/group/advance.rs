@@ -73,13 +73,15 @@ impl<const N: usize> Group<N> {
             }
         }
         let cycles = stop_cycles(fastest, config).max(1);
-        for (n, (config, speed)) in config.axes.iter().zip(speeds).enumerate() {
-            let Some(axis) = self.axes.get_mut(n) else {
-                break;
-            };
+        const PERCENT: f32 = 0.01;
+        let more = config.ramp_percent as f32 * PERCENT;
+        let least = config.ramp_min as f32;
+        let axes = self.axes.iter_mut().zip(&config.axes).zip(speeds);
+        for ((axis, config), speed) in axes {
             let slope = axis.stop(cycles, speed, config);
             if axis.seen & BY_POSITION != 0 {
-                self.set_ramps(n, slope, slope);
+                let ramp = greater(config.scale.rpm_per_s(slope) * more, least);
+                axis.set_ramps(ramp, ramp);
             }
         }
     }

@@ -332,23 +332,29 @@ impl Axis {
         }
         self.path.brake(position, velocity, cycles);
         let slope = velocity / cycles as f32;
-        for ahead in NEXT..AHEAD {
+        if cycles < AHEAD {
+            self.look(END);
+            self.look(AHEAD);
+        } else {
             // All axes stop in one step: this is shorter than to look.
-            if cycles < AHEAD {
-                self.look(ahead + 1);
-                continue;
-            }
             velocity -= slope;
             let position = self.path.glide();
-            if let Some(place) = self.samples.get_mut(place(self.count, ahead + 1)) {
-                *place = Sample {
-                    position,
-                    velocity,
-                    acceleration: -slope,
-                };
-            }
+            self.put(END, position, velocity, -slope);
+            let position = self.path.glide();
+            self.put(AHEAD, position, velocity - slope, -slope);
         }
         slope.abs()
+    }
+
+    #[inline(always)]
+    fn put(&mut self, ahead: u32, position: i64, velocity: f32, acceleration: f32) {
+        if let Some(place) = self.samples.get_mut(place(self.count, ahead)) {
+            *place = Sample {
+                position,
+                velocity,
+                acceleration,
+            };
+        }
     }
 
     /// How long it has waited to come to rest since its path ended, in cycles.
