@@ -23,8 +23,9 @@ const TARGET_VELOCITY: u16 = 0x60FF;
 const TARGET_TORQUE: u16 = 0x6071;
 /// A torque that counts as none, per mille: below it friction holds the axis.
 const NO_TORQUE: i64 = 5;
-/// An axis that is told another position moves if it is told yet another within so many
-/// SYNCs: a held one may be an increment off.
+/// An axis moves if it is told so many positions, each beyond the one before and so many
+/// SYNCs later at most: one that is held may be corrected.
+const POSITIONS: usize = 3;
 const NEXT_POSITION: usize = 10;
 
 /// A SYNC that was on the wire.
@@ -62,8 +63,17 @@ struct Axis {
     next: Option<Target>,
     /// Is followed since the last SYNC.
     present: Option<Target>,
-    /// The last other position.
-    other: Option<Edge>,
+    /// Positions in one direction.
+    run: Option<Run>,
+}
+
+/// Positions of which each is beyond the one before.
+#[derive(Clone, Copy, Debug)]
+struct Run {
+    first: Edge,
+    last: Edge,
+    up: bool,
+    count: usize,
 }
 
 /// All spans on all buses, in the order of their starts.
@@ -126,8 +136,17 @@ impl Axis {
         self.present = self.next.take().or(before);
         let moves = match (self.present, before) {
             (Some(Target::Position(to)), Some(Target::Position(before))) if to != before => {
-                let other = self.other.replace(now);
-                return other.filter(|other| now.sync - other.sync <= NEXT_POSITION);
+                let up = to > before;
+                let goes_on = |run: &Run| run.up == up && now.sync - run.last.sync <= NEXT_POSITION;
+                let run = self.run.filter(goes_on);
+                let run = Run {
+                    first: run.map_or(now, |run| run.first),
+                    last: now,
+                    up,
+                    count: run.map_or(0, |run| run.count) + 1,
+                };
+                self.run = Some(run);
+                return (run.count >= POSITIONS).then_some(run.first);
             }
             (Some(Target::Velocity(to)), _) => to.abs() as f64 > STANDSTILL_RPM,
             (Some(Target::Torque(to)), _) => to.abs() > NO_TORQUE,
@@ -141,7 +160,8 @@ impl Axis {
 pub(super) fn set_by(frame: &WireFrame, id: u16, network: &Network) -> Option<(usize, Target)> {
     let above = id.checked_sub(RPDO1)?;
     let number = above / RPDO_STEP;
-    if number >= RPDOS {
+    // Between them are the TPDOs, and the answers of SDO servers.
+    if number >= RPDOS || above % RPDO_STEP > NODE_MASK {
         return None;
     }
     let is_it = |node: &Node| u16::from(node.id.get()) == id & NODE_MASK;
@@ -256,6 +276,9 @@ mod tests {
         wire.push(record(14, 0x301, &[1; 8]));
         wire.push(record(15, 0x211, &[1; 6]));
         wire.push(record(16, 0x181, &[1; 6]));
+        // TPDO2, and the answer of an SDO server.
+        wire.push(record(16, 0x281, &[1; 8]));
+        wire.push(record(16, 0x581, &[1; 8]));
         wire.push(record(20, SYNC, &[]));
         assert!(spans(&wire).is_empty());
     }
