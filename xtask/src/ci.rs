@@ -51,7 +51,7 @@ fn tests(args: &[String]) -> Result<()> {
 /// `cargo xtask ci`: everything that has to pass, in the order of how soon it
 /// fails.
 pub(crate) fn command(options: &CiOptions) -> Result<ExitCode> {
-    let steps: [Step; 14] = [
+    let steps: [Step; 15] = [
         ("format", format),
         ("lints, host", lints_host),
         ("lints, board", lints_target),
@@ -61,6 +61,7 @@ pub(crate) fn command(options: &CiOptions) -> Result<ExitCode> {
         ("one run", one_run),
         ("bench startup", || benched(Bench::Startup)),
         ("bench sdo", || benched(Bench::Sdo)),
+        ("bench motion", || benched(Bench::Motion)),
         ("bench realtime", real_time),
         ("bench instructions", instructions),
         ("other tools", interop::tests),

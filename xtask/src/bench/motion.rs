@@ -1,6 +1,7 @@
-//! How many cycles of the core the steps of the axes take, in each mode that the
-//! image has.
+//! How many cycles of the core the steps of the axes take in each mode: while they move,
+//! when a move replaces another, when they are stopped, and when a fault stops them.
 
+use std::thread;
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail, ensure};
@@ -8,8 +9,9 @@ use canmaster::NodeId;
 use canmaster::id::Address;
 use canmaster::motion::{GroupState, panel};
 use canmaster_sim::board::irqs;
+use canmaster_sim::drive::DriveFault;
 use canmaster_sim::time::Time;
-use canmaster_sim::world::{Image, Scenario, World};
+use canmaster_sim::world::{Image, Scenario, Stimulus, World};
 use serde::Serialize;
 
 use super::{Outcome, Report};
@@ -19,9 +21,6 @@ use crate::table;
 const WORST: u64 = 10_000;
 /// All drives are enabled by then.
 const READY_BY: Time = Time::from_ms(8000);
-/// What a round trip may take beyond the program's own time.
-const MARGIN: Time = Time::from_ms(1500);
-
 /// A mode, and what is moved in it.
 #[derive(Clone, Copy)]
 struct Case {
@@ -34,12 +33,10 @@ struct Case {
 /// What the axes do while their steps are measured.
 #[derive(Clone, Copy)]
 enum Task {
-    /// The built-in program, released by the button.
-    Program,
     /// A move that is ordered over CAN, and replaced on the way.
     Move([i32; 2]),
-    /// A search for home by the method (6098h).
-    Home(u8),
+    /// A search for home where they are, and one that is stopped.
+    Home,
 }
 
 const fn case(mode: &'static str, code: i8, task: Task) -> Case {
@@ -48,18 +45,21 @@ const fn case(mode: &'static str, code: i8, task: Task) -> Case {
 
 /// Increments from home.
 const FAR: Task = Task::Move([20_000, -5_000]);
-/// Home is where the drive is.
+/// Homing methods (CiA 402-2, 11.3): home is where the drive is; home switch and index.
 const HERE: u8 = 37;
+const SWITCH: u8 = 7;
+/// An error of a drive that switches it off (EMCY).
+const OVERCURRENT: u16 = 0x2310;
 
 /// Every mode.
 const CASES: [Case; 6] = [
-    case("profile velocity", 3, Task::Program),
+    case("profile velocity", 3, FAR),
     case("cyclic synchronous position", 8, FAR),
     case("cyclic synchronous velocity", 9, FAR),
     // Per mille of the rated torque.
     case("cyclic synchronous torque", 10, Task::Move([30, -30])),
     case("profile position", 1, FAR),
-    case("homing", 6, Task::Home(HERE)),
+    case("homing", 6, Task::Home),
 ];
 
 /// Profile velocity and acceleration of a move, rpm and rpm/s; of a torque per mille
@@ -76,7 +76,7 @@ const START: u16 = 10;
 const PATIENCE: Time = Time::from_ms(3000);
 /// How long the first move is followed, and the one that replaces it.
 const FIRST: Time = Time::from_ms(400);
-const SECOND: Time = Time::from_ms(2500);
+const SECOND: Time = Time::from_ms(1200);
 
 /// What was measured in one mode.
 #[derive(Serialize)]
@@ -95,11 +95,16 @@ struct Figures {
 
 pub(super) fn run(image: &Image, seed: u64) -> Result<Outcome> {
     let started = Instant::now();
-    let mut modes = Vec::new();
-    for case in CASES {
-        eprintln!("{}", case.mode);
-        modes.push(case.measure(image, seed)?);
-    }
+    let modes: Result<Vec<Mode>> = thread::scope(|scope| {
+        let start = |case| scope.spawn(move || Case::measure(&case, image, seed));
+        let all = CASES.map(start).into_iter();
+        all.map(|one| {
+            one.join()
+                .unwrap_or_else(|_| bail!("the emulation broke off"))
+        })
+        .collect()
+    });
+    let modes = modes?;
     let figures = Figures {
         axes: image.machine().network().nodes.len(),
         worst_allowed: WORST,
@@ -128,12 +133,13 @@ impl Case {
         if self.code != PROFILE_VELOCITY {
             tool.change_modes(self.code)?;
         }
+        tool.until(GroupState::Standby)?;
         tool.world.clear_stats();
         match self.task {
-            Task::Program => round_trip(&mut tool.world)?,
             Task::Move(targets) => tool.moves(targets)?,
-            Task::Home(method) => tool.home(method)?,
+            Task::Home => tool.home()?,
         }
+        tool.fault()?;
         let stats = tool.world.board().stats();
         let steps = stats.irq(irqs::TIM3).context("the axes were not stepped")?;
         Ok(Mode {
@@ -146,15 +152,6 @@ impl Case {
 
 /// The mode that the drives start in.
 const PROFILE_VELOCITY: i8 = 3;
-
-/// The program, released by the button.
-fn round_trip(world: &mut World<'_>) -> Result<()> {
-    world.press();
-    let limit = world.now() + world.machine().round_trip().unwrap_or(Time::ZERO) + MARGIN;
-    let done = world.run_to(limit, |world| world.round_trips() == (1, false));
-    ensure!(done, "the round trip did not end; see `cargo xtask run`");
-    Ok(())
-}
 
 /// A tool on the bus that orders by SDO what the group does.
 struct Tool<'i> {
@@ -237,21 +234,40 @@ impl<'i> Tool<'i> {
             self.write(panel::VELOCITY, axis, &VELOCITY.to_le_bytes())?;
             self.write(panel::ACCELERATION, axis, &ACCELERATION.to_le_bytes())?;
         }
+        let [first, second] = targets;
         self.command(RELEASE)?;
         self.until(GroupState::Moving)?;
-        for (target, time) in targets.into_iter().zip([FIRST, SECOND]) {
-            for axis in 1..=self.nodes.len() {
-                self.write(panel::TARGET, axis, &target.to_le_bytes())?;
-            }
-            self.command(START)?;
-            self.world.run_until(self.world.now() + time);
-        }
-        self.until(GroupState::Moving)?;
+        self.start(first, FIRST)?;
+        self.start(second, SECOND)?;
+        self.start(first, FIRST)?;
         self.command(STOP)?;
-        self.until(GroupState::Standby)
+        self.until(GroupState::Standby)?;
+        self.command(RELEASE)?;
+        self.until(GroupState::Moving)?;
+        self.start(second, FIRST)
     }
 
-    fn home(&mut self, method: u8) -> Result<()> {
+    /// A move of all axes, and so much of it.
+    fn start(&mut self, target: i32, time: Time) -> Result<()> {
+        for axis in 1..=self.nodes.len() {
+            self.write(panel::TARGET, axis, &target.to_le_bytes())?;
+        }
+        self.command(START)?;
+        self.world.run_until(self.world.now() + time);
+        self.until(GroupState::Moving)
+    }
+
+    fn home(&mut self) -> Result<()> {
+        self.search(HERE)?;
+        self.until(GroupState::Standby)?;
+        self.search(SWITCH)?;
+        self.command(STOP)?;
+        self.until(GroupState::Standby)?;
+        self.search(SWITCH)
+    }
+
+    /// All axes search for home by this method, for a while.
+    fn search(&mut self, method: u8) -> Result<()> {
         let at = Address::new(HOMING_METHOD, 0);
         for node in self.nodes.clone() {
             let done = self.world.sdo_write(node, at, &[method]);
@@ -259,7 +275,19 @@ impl<'i> Tool<'i> {
         }
         self.command(HOME)?;
         self.world.run_until(self.world.now() + FIRST);
-        self.until(GroupState::Standby)
+        Ok(())
+    }
+
+    /// The first drive fails, and the others are stopped.
+    fn fault(&mut self) -> Result<()> {
+        let node = *self.nodes.first().context("there is no axis")?;
+        let fault = DriveFault::Error {
+            at: self.world.now(),
+            code: OVERCURRENT,
+            until: None,
+        };
+        self.world.apply(Stimulus::Drive { node, fault });
+        self.until(GroupState::Faulted)
     }
 }
 
