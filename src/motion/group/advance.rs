@@ -121,7 +121,10 @@ impl<const N: usize> Group<N> {
                     false
                 }
             },
-            GroupState::QuickStop | GroupState::FaultStop => self.comes_to_rest(config),
+            // The step that begins it has enough to do.
+            GroupState::QuickStop | GroupState::FaultStop => {
+                self.since > 0 && self.comes_to_rest(config)
+            }
         };
         if done {
             self.happen(Event::Done);

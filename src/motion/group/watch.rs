@@ -36,7 +36,8 @@ impl<const N: usize> Group<N> {
                 self.fault(Some(n as u8), cause, Event::Fault);
             }
         }
-        if self.state == GroupState::FaultStop {
+        // Who is left to himself is told from the next step on.
+        if state == GroupState::FaultStop {
             self.exclude_lost_axes();
         }
     }
