@@ -2,6 +2,7 @@
 
 use super::axis::{
     AT_REST, Axis, BY_DRIVE, BY_POSITION, ENABLED, ENDED, PASSING, PLACED, REACHED, SILENT, SLOW,
+    STOP_MIN,
 };
 use super::{Group, ModeWanted, bit};
 use crate::cia402::Goal;
@@ -72,7 +73,7 @@ impl<const N: usize> Group<N> {
                 fastest = greater(fastest, speed.abs());
             }
         }
-        let cycles = stop_cycles(fastest, config).max(1);
+        let cycles = stop_cycles(fastest, config).max(STOP_MIN);
         const PERCENT: f32 = 0.01;
         let more = config.ramp_percent as f32 * PERCENT;
         let least = config.ramp_min as f32;

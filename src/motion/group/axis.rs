@@ -17,6 +17,8 @@ const AHEAD: u32 = 3;
 const NEXT: u32 = 1;
 const END: u32 = 2;
 const RING: usize = 4;
+/// Cycles of the shortest stop: it ends behind what it is looked ahead.
+pub(super) const STOP_MIN: u32 = AHEAD;
 
 /// A set of axes: bit n for axis n.
 pub(super) type Axes = u32;
@@ -315,7 +317,7 @@ impl Axis {
     }
 
     /// Replaces the path by a ramp from `speed` in so many cycles from the next SYNC
-    /// on. The slope of it in increments per cycle squared.
+    /// on, at least [`STOP_MIN`]. The slope of it in increments per cycle squared.
     #[inline(never)]
     pub(super) fn stop(&mut self, cycles: u32, speed: f32, config: &AxisConfig) -> f32 {
         self.over = 0;
@@ -332,17 +334,12 @@ impl Axis {
         }
         self.path.brake(position, velocity, cycles);
         let slope = velocity / cycles as f32;
-        if cycles < AHEAD {
-            self.look(END);
-            self.look(AHEAD);
-        } else {
-            // All axes stop in one step: this is shorter than to look.
-            velocity -= slope;
-            let position = self.path.glide();
-            self.put(END, position, velocity, -slope);
-            let position = self.path.glide();
-            self.put(AHEAD, position, velocity - slope, -slope);
-        }
+        // All axes stop in one step: this is shorter than to look.
+        velocity -= slope;
+        let position = self.path.glide();
+        self.put(END, position, velocity, -slope);
+        let position = self.path.glide();
+        self.put(AHEAD, position, velocity - slope, -slope);
         slope.abs()
     }
 

@@ -167,12 +167,9 @@ impl<const N: usize> Group<N> {
     /// Those of which, of `mask`, exactly `what` is seen.
     #[inline(never)]
     fn matching(&self, mask: Seen, what: Seen) -> Axes {
-        let (mut axes, mut bit) = (0, 1);
-        for axis in &self.axes {
-            if axis.seen & mask == what {
-                axes |= bit;
-            }
-            bit <<= 1;
+        let mut axes = 0;
+        for axis in self.axes.iter().rev() {
+            axes = axes << 1 | Axes::from(axis.seen & mask == what);
         }
         axes
     }
