@@ -15,6 +15,7 @@ use std::ffi::{OsStr, OsString};
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, ExitStatus, Stdio};
+use std::sync::OnceLock;
 
 use anyhow::{Context, Result};
 use object::{Object, ObjectSymbol, SymbolKind};
@@ -28,16 +29,21 @@ const ROLE: &str = "CANMASTER_XTASK_IS_RUSTC";
 /// What LLVM says of each name that is no function's: those that it inlined.
 const UNKNOWN_NAME: &[u8] = b"Function in CSV file at line";
 
+/// Where this program lay when it was started. A cargo that it runs may put another
+/// build of it there meanwhile, which does just as well.
+static PROGRAM: OnceLock<Option<PathBuf>> = OnceLock::new();
+
 /// Makes a build of the image leave them out.
 pub(crate) fn leave_out(command: &mut Command) {
     // Without it the image is larger, and just as good.
-    if let Ok(this) = std::env::current_exe() {
+    if let Some(Some(this)) = PROGRAM.get() {
         command.env(WRAPPER, this).env(ROLE, "1");
     }
 }
 
-/// Compiles, if this program was called for that.
+/// Compiles, if this program was called for that. The first thing that it does.
 pub(crate) fn compiler() -> Option<ExitCode> {
+    PROGRAM.get_or_init(|| std::env::current_exe().ok());
     std::env::var_os(ROLE)?;
     let mut arguments = std::env::args_os().skip(1);
     let rustc = arguments.next()?;
