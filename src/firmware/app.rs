@@ -351,7 +351,8 @@ mod app {
     /// the next SYNC puts into effect.
     ///
     /// Trigger: pended by the last expected TPDO, or TIM3 compare at the
-    /// deadline, whichever is first; once per cycle. Budget: 30 000 cycles. If it
+    /// deadline, whichever is first; once per cycle. Budget: 10 000 cycles of its own
+    /// (`bench motion`), and those of what preempts it. If it
     /// has not run before the next SYNC, that cycle is an overrun: it is counted,
     /// and the drives keep the set-points of the cycle before. Several in a row stop
     /// the group (`design::LATE_CYCLES_MAX`); if none gets out for 100 ms, the watchdog

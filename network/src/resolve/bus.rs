@@ -18,9 +18,9 @@ pub(crate) const CYCLE_MAX_US: i64 = u16::MAX as i64;
 const PERIPHERALS: [(&str, u8); 3] = [("FDCAN1", 1), ("FDCAN2", 2), ("FDCAN3", 3)];
 /// From the last TPDO to the first RPDO, as measured with room to spare.
 const COMPUTE_US: u32 = 200;
-/// What each axis takes of that at worst, in the cycle in which all of them begin to
-/// move: `pdo_producer` takes up to 20 250 cycles of 170 MHz for six axes, preempted by
-/// `sync_tick` and `can_irq` (docs/performance.md).
+/// What each axis takes of that at worst. For six axes `pdo_producer` takes up to 10 000
+/// cycles of 170 MHz (docs/performance.md); `sync_tick` and `can_irq` preempt it, and
+/// silicon has flash wait states, which the emulated core has not: as much again.
 const COMPUTE_AXIS_US: u32 = 20;
 /// A request and its answer.
 const SDO_FRAMES: u32 = 2;
