@@ -36,7 +36,7 @@ const NETWORK_VARIABLE: &str = "CANMASTER_NETWORK";
 
 /// The image holds every log line; the host filters.
 const DEFMT_LOG: &str = "trace";
-/// Room for the burst of lines while six drives are configured at once.
+/// Room for a hundred lines or so until a debugger looks again.
 const DEFMT_RTT_BUFFER_SIZE: &str = "1024";
 
 /// `cargo xtask build`.
