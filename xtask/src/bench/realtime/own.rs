@@ -34,8 +34,9 @@ const JITTER_US: f64 = 1.0;
 const FRAME_BITS: f64 = 111.0;
 /// The board's load is that of the last second.
 const CPU_LOAD_LIMIT: f64 = 0.01;
-/// Answers on their way when the counting begins, and when it ends.
-const ANSWERS_UNDER_WAY: u32 = 4;
+/// Answers on their way when the counting begins, and when it ends, and those that come
+/// while the board is asked for what it has counted: some 100 ms on a bus that is full.
+const ANSWERS_UNDER_WAY: u32 = 10;
 const PER_MILLE: f64 = 1000.0;
 /// Of a frame without data, with the interframe space.
 const EMPTY_BITS: u32 = 47;
