@@ -297,7 +297,8 @@ impl<const N: usize> Panel<N> {
         }
     }
 
-    /// Takes note of what the group reports: the first fault of each axis.
+    /// Takes note of what the group reports: the first fault of each axis, and what
+    /// was found impossible when it was planned.
     pub fn on_event(&mut self, event: &GroupEvent) {
         match *event {
             GroupEvent::Fault {
@@ -312,6 +313,12 @@ impl<const N: usize> Panel<N> {
                 to: GroupState::Enabling,
                 ..
             } => self.faults = [0; N],
+            GroupEvent::ReleaseRefused(ref why)
+            | GroupEvent::ProgramFailed(ref why)
+            | GroupEvent::MoveRefused(ref why) => {
+                // Nobody waits for the answer.
+                let _ = self.note(Err(Refused), why);
+            }
             _ => {}
         }
     }

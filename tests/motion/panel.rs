@@ -12,6 +12,8 @@ use crate::rig::{AXES, READY, Rig};
 struct Desk {
     rig: Rig,
     panel: Panel<AXES>,
+    /// Notices that the panel has heard.
+    told: usize,
 }
 
 impl Desk {
@@ -19,6 +21,7 @@ impl Desk {
         Desk {
             rig: Rig::standby(1),
             panel: Panel::new(),
+            told: 0,
         }
     }
 
@@ -55,9 +58,10 @@ impl Desk {
         self.rig.step(inputs);
         self.panel.poll(&mut self.rig.group);
         let events = std::mem::take(&mut self.rig.events);
-        for event in &events {
+        for event in events.iter().chain(&self.rig.notices[self.told..]) {
             self.panel.on_event(event);
         }
+        self.told = self.rig.notices.len();
     }
 
     #[track_caller]
@@ -184,6 +188,43 @@ fn what_no_axis_can_do_is_refused_with_the_axis() {
     desk.set(panel::ACCELERATION, 4, 1000).unwrap();
     assert_eq!(desk.set(panel::COMMAND, 0, 10), Err(VALUE));
     assert_eq!(desk.get(panel::REFUSAL, 0) as u32 >> 16, 0x041C);
+}
+
+/// What is found only when it is planned stands in 2002h as well.
+#[test]
+fn what_the_plan_refuses_is_told() {
+    let told = |desk: &Desk| format!("{:08X}", desk.get(panel::REFUSAL, 0));
+    let mut desk = Desk::new();
+    // The button, which no state but standby obeys.
+    desk.command(3);
+    desk.until(GroupState::Moving);
+    let Rig {
+        group, director, ..
+    } = &mut desk.rig;
+    director.press(group);
+    director.press(group);
+    desk.step(READY);
+    assert_eq!(told(&desk), "FF070001");
+    // A move that takes too long.
+    let mut desk = Desk::new();
+    desk.command(3);
+    desk.until(GroupState::Moving);
+    desk.set(panel::AXES, 0, 0b10).unwrap();
+    desk.set(panel::TARGET, 2, 1_000_000_000).unwrap();
+    desk.set(panel::VELOCITY, 2, 1).unwrap();
+    desk.set(panel::ACCELERATION, 2, 2000).unwrap();
+    desk.command(10);
+    desk.step(READY);
+    desk.step(READY);
+    assert_eq!(told(&desk), "0221FFFF");
+    // A step of a program.
+    let text = "velocity = 600\nacceleration = 2000\n[[step]]\nwait_ms = 10\n[[step]]\n\
+        [[step.move]]\naxes = [\"axis 3\"]\nvelocity = 1\nby = 1_000_000_000";
+    let mut desk = Desk::new();
+    desk.rig.program = compiled(text).bytes();
+    desk.command(12);
+    desk.until(GroupState::Standby);
+    assert_eq!(told(&desk), "03210002");
 }
 
 #[test]
