@@ -213,6 +213,42 @@ fn way_points_are_passed_with_blends() {
     assert!((rig.drives[1].position - homes[1] + 9000.0).abs() <= 3.0);
 }
 
+/// A step that does not wait is finished by its drive before it takes the next one,
+/// whatever stands between the two; no other step keeps the next one waiting.
+#[test]
+fn what_a_drive_leads_is_finished_unless_it_was_waited_for() {
+    const IMMEDIATELY: u16 = 1 << 5;
+    let position = |flags, target| go(flags, &[(0, target, 600, 2000)]);
+    let (out, back) = (position(2, 6000), position(0, 0));
+    let of = |steps: &[Vec<u8>]| {
+        let mut rig = Rig::in_mode(1, Mode::ProfilePosition);
+        rig.program = program(steps);
+        assert_eq!(format::check(&rig.program, &GROUP), Ok(()));
+        rig.run();
+        let (mut begun, mut before) = (Vec::new(), 0);
+        while !rig.notices.contains(&GroupEvent::ProgramDone) {
+            rig.step(READY);
+            let word = rig.commands[0].controlword;
+            if word & !before & 1 << 4 != 0 {
+                begun.push(word & IMMEDIATELY != 0);
+            }
+            before = word;
+            assert!(rig.cycle < 4000, "{}", rig.last());
+        }
+        begun
+    };
+    assert_eq!(of(&[out.clone(), back.clone()]), [true, false]);
+    let repeated = [times(2), out.clone(), end(), back.clone()];
+    assert_eq!(of(&repeated), [true, false, false]);
+    let waited = [times(2), position(0, 6000), end(), back.clone()];
+    assert_eq!(of(&waited), [true, true, true]);
+    assert_eq!(of(&[out.clone(), wait(3), back.clone()]), [true, false]);
+    // Mode 3 is no flag: nothing that does not wait.
+    let modes = |mode| head(format::MODE, mode, 2, 0);
+    assert_eq!(of(&[modes(3), back.clone()]), [true]);
+    assert_eq!(of(&[out, modes(10), back]), [true, true]);
+}
+
 /// Homing and modes inside of a program: one release counts for all of it.
 #[test]
 fn home_then_move_in_another_mode() {

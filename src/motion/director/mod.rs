@@ -301,6 +301,7 @@ impl<const N: usize> Director<N> {
         match self.phase {
             Phase::Released => {
                 self.next = self.at;
+                self.flying = false;
                 self.phase = Phase::Next;
             }
             Phase::Arriving => {
@@ -371,9 +372,12 @@ impl<const N: usize> Director<N> {
             let step = self.number.wrapping_sub(1) as u8;
             group.report(GroupEvent::StepStarted { step });
         }
-        self.after = self.flying;
-        self.flying = step.has(FLYING);
         self.path = step.kind == format::PATH;
+        // What else there is waits for nobody, or for all.
+        if self.path || step.kind == format::MOVE {
+            self.after = self.flying;
+            self.flying = step.has(FLYING);
+        }
         self.phase = match step.kind {
             format::MOVE => {
                 self.phase = Phase::Plan;
