@@ -55,13 +55,14 @@ pub enum Reason {
     Cycle,
     /// CRC-16.
     Checksum,
-    /// Kind of a step.
+    /// Kind of a step, or the flags of one that has less.
     Step,
     /// The axes of a step, bit n for axis n.
     Members,
     /// Mode of operation, as 6060h; allowed are those of 6502h.
     Mode,
-    /// How deep a loop lies in others; below 1 one ends that did not begin.
+    /// How deep a loop lies in others; below 1 one ends that did not begin,
+    /// or has nothing in it.
     Loop,
     /// Points of a path, or cycles from one to the next.
     Points,
@@ -79,7 +80,7 @@ pub enum Reason {
     Target,
     /// Torque, per mille of the rated one.
     Torque,
-    /// Cycles of a move.
+    /// Cycles of a move, a wait or a search for home.
     Time,
 }
 
@@ -117,7 +118,7 @@ in_words!(Reason by Reason::place {
     Reason::Axes => ("number of axes"),
     Reason::Cycle => ("SYNC period in us"),
     Reason::Checksum => ("checksum"),
-    Reason::Step => ("kind of the step"),
+    Reason::Step => ("kind or flags of the step"),
     Reason::Members => ("set of axes"),
     Reason::Mode => ("mode of operation"),
     Reason::Loop => ("depth of loops"),

@@ -438,6 +438,39 @@ fn a_step_that_is_wrong_is_named() {
     assert_eq!(of(&[far]), expected);
 }
 
+/// What a step does not have is no part of it: flags, axes, and times without end.
+#[test]
+fn a_step_has_no_more_than_it_may() {
+    let of = |steps: &[Vec<u8>]| wrong(&program(steps));
+    let with = |kind, flags, axes, value| of(&[head(kind, flags, axes, value)]);
+    let mut odd = go(0, &[(0, 1, 1, 1)]);
+    odd[1] = 4;
+    assert_eq!(of(&[odd]), (Reason::Step, NONE, 1, 4, 3));
+    let mut odd = shape(1, 1 << 16 | 1, 1, &[(10, 0, 0)]);
+    odd[1] = 8;
+    assert_eq!(of(&[odd]), (Reason::Step, NONE, 1, 8, 7));
+    for kind in [format::WAIT, format::LOOP, format::END_LOOP] {
+        let steps = [times(1), wait(1), head(kind, 1, 0, 1)];
+        assert_eq!(of(&steps), (Reason::Step, NONE, 3, 1, 0), "{kind}");
+        let steps = [times(1), wait(1), head(kind, 0, 2, 1)];
+        assert_eq!(of(&steps), (Reason::Members, NONE, 3, 2, 0), "{kind}");
+    }
+    assert_eq!(with(format::HOME, 6, 1, 1), (Reason::Step, NONE, 1, 6, 0));
+    let most = i32::MAX;
+    for (kind, axes) in [(format::WAIT, 0), (format::HOME, 1)] {
+        for time in [0, 1 << 31, u32::MAX] {
+            let expected = (Reason::Time, NONE, 1, time as i32, most);
+            assert_eq!(with(kind, 0, axes, time), expected);
+        }
+        let longest = program(&[head(kind, 0, axes, most as u32)]);
+        assert_eq!(format::check(&longest, &GROUP), Ok(()));
+    }
+    // Nothing, for ever.
+    assert_eq!(of(&[times(0), end()]), (Reason::Loop, NONE, 1, 0, 4));
+    let within = [times(0), wait(1), times(2), end(), end()];
+    assert_eq!(of(&within), (Reason::Loop, NONE, 3, 0, 4));
+}
+
 #[test]
 fn a_path_that_is_wrong_is_named() {
     const ONCE: u32 = 1 << 16;

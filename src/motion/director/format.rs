@@ -42,6 +42,17 @@ pub const FLYING: u8 = 2;
 /// One shape for all axes of a path, each with its amplitude.
 pub const SHARED: u8 = 4;
 
+/// The flags that a step of each kind may have.
+const FLAGS: [u8; MODE as usize] = [
+    RELATIVE | FLYING,
+    0,
+    0,
+    0,
+    RELATIVE | FLYING | SHARED,
+    0,
+    u8::MAX,
+];
+
 /// Bytes of one axis' part of a move: target, velocity with the set in its upper
 /// eight bits, acceleration, deceleration.
 const MOVE_PART: usize = 16;
@@ -281,25 +292,34 @@ fn check_step<const N: usize>(
     config: &GroupConfig<N>,
     why: &mut Refusal,
 ) -> Judged {
-    match step.kind {
-        WAIT => return Ok(()),
-        LOOP | END_LOOP => {
-            let deeper = depth.wrapping_add(1);
-            let (now, then) = match step.kind {
-                LOOP => (deeper, deeper),
-                _ => (*depth, depth.wrapping_sub(1)),
-            };
-            *depth = then;
-            return match now {
-                1..=4 => Ok(()),
-                _ => why.because(Reason::Loop, now, LOOPS as u32),
-            };
-        }
-        MOVE | PATH | HOME | MODE => {}
-        kind => return why.because(Reason::Step, kind.into(), MODE.into()),
+    let Some(&flags) = FLAGS.get(usize::from(step.kind).wrapping_sub(1)) else {
+        return why.because(Reason::Step, step.kind.into(), MODE.into());
+    };
+    if step.flags & !flags != 0 {
+        return why.because(Reason::Step, step.flags.into(), flags.into());
     }
-    if step.axes == 0 || step.axes >> N != 0 {
-        return why.because(Reason::Members, step.axes, (1 << N) - 1);
+    let is = |kinds: u32| kinds >> step.kind & 1 != 0;
+    if !is(1 << WAIT | 1 << LOOP | 1 << END_LOOP) {
+        why.within(Reason::Members, step.axes, (1 << N) - 1)?;
+    } else if step.axes != 0 {
+        return why.because(Reason::Members, step.axes, 0);
+    }
+    if is(1 << WAIT | 1 << HOME) {
+        why.within(Reason::Time, step.value, i32::MAX as u32)?;
+    }
+    if is(1 << LOOP | 1 << END_LOOP) {
+        if step.kind == LOOP {
+            *depth = depth.wrapping_add(1);
+            if step.body.first() == Some(&END_LOOP) {
+                // One around nothing takes no time.
+                *depth = 0;
+            }
+        }
+        why.within(Reason::Loop, *depth, LOOPS as u32)?;
+        if step.kind == END_LOOP {
+            *depth -= 1;
+        }
+        return Ok(());
     }
     if step.kind == PATH && (step.points() == 0 || step.periods() == 0) {
         return why.because(Reason::Points, step.value, 0);
