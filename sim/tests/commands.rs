@@ -22,6 +22,7 @@ const ENABLE: u32 = 1;
 const DISABLE: u32 = 2;
 const RELEASE: u32 = 3;
 const STOP: u32 = 4;
+const HALT: u32 = 5;
 const SET_MODES: u32 = 9;
 const START: u32 = 10;
 const RUN: u32 = 12;
@@ -294,6 +295,37 @@ fn profile_position_is_relative_buffered_and_immediate() {
     assert!(farthest < 30_000, "{farthest}");
     command(&mut client, STOP).unwrap();
     until(&mut client, GroupState::Standby);
+}
+
+/// A set-point that was stopped, or halted, is gone: neither standby nor the next
+/// release goes on with it.
+#[test]
+fn a_stopped_set_point_is_not_gone_on_with() {
+    const SET_POINT: u32 = 1;
+    let mut client = in_standby(48);
+    for axis in 1..=AXES {
+        client.put(panel::MODE, axis, SET_POINT, 1).unwrap();
+    }
+    command(&mut client, SET_MODES).unwrap();
+    client.listen(Time::from_ms(1000));
+    until(&mut client, GroupState::Standby);
+    for order in [STOP, HALT] {
+        command(&mut client, RELEASE).unwrap();
+        until(&mut client, GroupState::Moving);
+        put_targets(&mut client, 60_000);
+        command(&mut client, START).unwrap();
+        client.listen(Time::from_ms(500));
+        command(&mut client, order).unwrap();
+        client.listen(Time::from_ms(1500));
+        let rest = positions(&mut client);
+        client.listen(Time::from_ms(1000));
+        arrived(&mut client, &rest, 0);
+        command(&mut client, RELEASE).unwrap();
+        client.listen(Time::from_ms(1000));
+        arrived(&mut client, &rest, 0);
+        command(&mut client, STOP).unwrap();
+        until(&mut client, GroupState::Standby);
+    }
 }
 
 #[test]

@@ -132,6 +132,8 @@ fn a_set_point_replaces_the_running_one() {
         immediately: true,
         relative: false,
     };
+    assert!(!rig.group.ask(0, &to(60_000)), "it is told to stay first");
+    rig.arrive(20);
     assert!(rig.group.ask(0, &to(60_000)));
     assert!(
         !rig.group.ask(0, &to(0)),
@@ -143,6 +145,59 @@ fn a_set_point_replaces_the_running_one() {
     assert!(rig.group.ask(0, &to(1000)));
     rig.arrive(2000);
     assert!((rig.drives[0].position - f64::from(home + 1000)).abs() < 5.0);
+}
+
+/// A drive goes on with its set-point when halt is over (CiA 402-2, 10.3): what was
+/// stopped or halted is replaced before, in standby, in the next release, and in
+/// another mode and back.
+#[test]
+fn a_stopped_set_point_is_not_gone_on_with() {
+    for order in [Order::Stop, Order::Halt] {
+        for moment in [2, 3, 4, 5, 60] {
+            let mut rig = Rig::in_mode(3, Mode::ProfilePosition);
+            rig.released();
+            rig.go(far);
+            for _ in 0..moment {
+                rig.step(READY);
+            }
+            rig.order(order);
+            rig.step(READY);
+            for _ in 0..200 {
+                rig.step(READY);
+                let word = ControlWord(rig.commands[0].controlword);
+                assert!(!word.halt() || word.0 & 1 << 4 == 0, "no edge afterwards");
+            }
+            let rest = rig.drives.each_ref().map(|drive| drive.position);
+            let stays = |rig: &mut Rig, cycles: u32| {
+                for _ in 0..cycles {
+                    rig.step(READY);
+                }
+                for (drive, rest) in rig.drives.iter().zip(rest) {
+                    assert!((drive.position - rest).abs() < 3.0, "{order:?} {moment}");
+                }
+            };
+            stays(&mut rig, 100);
+            rig.released();
+            stays(&mut rig, 100);
+            rig.order(Order::Stop);
+            rig.until(Standby, 100);
+            for mode in [Mode::CyclicPosition, Mode::ProfilePosition] {
+                rig.order(Order::SetMode { axes: ALL, mode });
+                rig.step(READY);
+                rig.until(Standby, 100);
+                stays(&mut rig, 100);
+            }
+            rig.released();
+            rig.go(|n| AxisMove {
+                target: 1000,
+                ..far(n)
+            });
+            stays(&mut rig, 1);
+            rig.arrive(2000);
+            let home = f64::from(rig.group.view(0).unwrap().home);
+            assert!((rig.drives[0].position - home - 1000.0).abs() < 5.0);
+        }
+    }
 }
 
 /// Halt in profile position; after a fault quick stop.

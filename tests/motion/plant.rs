@@ -124,7 +124,7 @@ impl Drive {
     pub(crate) fn sync(&mut self) -> AxisFeedback {
         // What the statusword says was true before the new controlword.
         let leads = matches!(self.mode, Mode::ProfilePosition | Mode::Homing);
-        let there = self.velocity.abs() < 5.0 && self.going.is_none();
+        let there = self.velocity.abs() < 5.0 && (self.going.is_none() || self.word.halt());
         let failed = self.mode == Mode::Homing && self.homeless && self.word.0 & 1 << 4 != 0;
         let bits = u16::from(there) << 10
             | u16::from(leads && self.answered) << 12
@@ -178,9 +178,6 @@ impl Drive {
                 self.going = Some(f64::from(self.target.target));
             }
             self.answered = begin;
-        }
-        if self.word.halt() {
-            self.going = None;
         }
     }
 
@@ -254,13 +251,15 @@ impl Drive {
                 self.demand = feed + 40.0 * (aim - self.position) / PER_RPM;
             }
             Mode::ProfilePosition | Mode::Homing => {
-                let left = self.going.map_or(0.0, |to| to - self.position);
+                // With halt it brakes, and goes on afterwards.
+                let going = self.going.filter(|_| !self.word.halt());
+                let left = going.map_or(0.0, |to| to - self.position);
                 let speed =
                     (2.0 * left.abs() / PER_RPM * f64::from(self.target.deceleration) * 0.5)
                         .sqrt()
                         .min(500.0);
                 self.ramp(speed.copysign(left));
-                if left.abs() < 2.0 && self.velocity.abs() < 5.0 {
+                if going.is_some() && left.abs() < 2.0 && self.velocity.abs() < 5.0 {
                     self.going = None;
                 }
             }

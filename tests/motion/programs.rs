@@ -225,11 +225,12 @@ fn what_a_drive_leads_is_finished_unless_it_was_waited_for() {
         rig.program = program(steps);
         assert_eq!(format::check(&rig.program, &GROUP), Ok(()));
         rig.run();
-        let (mut begun, mut before) = (Vec::new(), 0);
+        let (mut begun, mut before) = (Vec::new(), u16::MAX);
         while !rig.notices.contains(&GroupEvent::ProgramDone) {
             rig.step(READY);
             let word = rig.commands[0].controlword;
-            if word & !before & 1 << 4 != 0 {
+            let moving = rig.group.state() == GroupState::Moving;
+            if moving && word & !before & 1 << 4 != 0 {
                 begun.push(word & IMMEDIATELY != 0);
             }
             before = word;

@@ -2,7 +2,7 @@
 
 use super::AxisCommand;
 use super::drive_led::DriveLed;
-use crate::cia402::{self, State, StatusWord};
+use crate::cia402::{self, Command, ControlWord, State, StatusWord};
 use crate::motion::fixed;
 use crate::motion::mode::Mode;
 use crate::motion::path::{Path, Point, Sample};
@@ -288,8 +288,9 @@ impl Axis {
             _ => fixed::round(self.sample(END).position),
         };
         self.samples = [Sample::at_rest(position); RING];
-        self.path.restart(&Point::at_rest(position));
-        self.over = 0;
+        self.end_at(position);
+        let holds = self.mode() == Mode::ProfilePosition;
+        self.led.rest(holds.then_some(position));
     }
 
     /// Its drive leads it to `position` by itself.
@@ -387,8 +388,12 @@ impl Axis {
         let rests = matches!(lead, Lead::Rest | Lead::Actual);
         out.mode = mode;
         out.controlword = word;
+        // While the mode changes, bit 4 may begin something in the other one.
+        let led = lead != Lead::Actual
+            && self.wanted.is_none()
+            && ControlWord(word).gives(Command::EnableOperation);
         self.target = match mode {
-            Mode::ProfilePosition | Mode::Homing if !rests => {
+            Mode::ProfilePosition | Mode::Homing if led => {
                 out.controlword |= self.led.bits(lead == Lead::Halt);
                 self.led.target
             }

@@ -83,16 +83,32 @@ impl DriveLed {
         } | if set_point.relative { RELATIVE } else { 0 };
     }
 
+    /// Nothing is asked. If it `holds` a position, that replaces what the drive was told
+    /// before, from the next controlword on: without it the drive goes on with that
+    /// as soon as halt is over.
+    pub(super) fn rest(&mut self, holds: Option<i32>) {
+        self.ask(&SetPoint {
+            target: holds.unwrap_or(0),
+            immediately: true,
+            relative: false,
+        });
+        self.phase = match holds {
+            Some(_) => Phase::Set,
+            None => Phase::Done,
+        };
+    }
+
     /// Homing, to end within `limit` cycles.
     pub(super) fn home(&mut self, limit: u32) {
         self.ask(&SetPoint::default());
         self.limit = limit;
     }
 
-    /// Bits 4 to 6 and 8 of the controlword.
+    /// Bits 4 to 6 and 8 of the controlword. Halt takes the others back, so that what
+    /// follows it begins with an edge.
     pub(super) fn bits(&self, halt: bool) -> u16 {
         let begun = match self.phase {
-            Phase::Set => BEGIN | self.flags,
+            Phase::Set if !halt => BEGIN | self.flags,
             _ => 0,
         };
         ControlWord(begun).with_halt(halt).0

@@ -1,6 +1,6 @@
 //! Orders to the group, judged at once and carried out in the next step.
 
-use super::axis::{FRESH, SLOW};
+use super::axis::{Axes, FRESH, SLOW};
 use super::{Group, Inputs, bit};
 use crate::motion::contract::{Cell, Event, cell};
 use crate::motion::mode::Mode;
@@ -180,6 +180,10 @@ impl<const N: usize> Group<N> {
             (Order::Release, GroupState::Moving) => {
                 self.hold_actual();
                 self.busy = 0;
+                for (n, axis) in self.axes.iter().enumerate() {
+                    // Until its drive has taken over where it is.
+                    self.busy |= Axes::from(!axis.led.is_done()) << n;
+                }
                 return;
             }
             (Order::Home { axes, .. }, GroupState::Homing)
