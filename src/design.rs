@@ -37,6 +37,11 @@ pub const fn tx_queue(axes: usize) -> usize {
 /// at 1 Mbit/s for longer than the millisecond after which the next are made.
 pub const OWN_FRAMES: usize = 10;
 
+/// Segments that a client may send to the board's SDO server one behind the other in a
+/// block download. More of them fill the bus as long as the block lasts, and no layout of
+/// the cycle has room for that: RPDOs came too late, and the group stopped.
+pub const OWN_BLOCK: u8 = 1;
+
 /// Frames that may wait for a task, plus one that the ring leaves empty. The
 /// tasks are woken by the first; this is a burst from every node at once.
 pub const fn rx_queue(axes: usize) -> usize {

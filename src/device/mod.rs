@@ -49,6 +49,7 @@ pub use settings::{Setting, Settings};
 pub use transfer::TransferTest;
 
 use crate::boot::{self, Startup};
+use crate::design::OWN_BLOCK;
 use crate::emcy::{self, Emcy, EmcyCode};
 use crate::frame::{Frame, MAX_DATA};
 use crate::id::{Address, NodeId};
@@ -202,7 +203,7 @@ impl<const N: usize> Device<N> {
         timeout: Duration,
     ) -> Device<N> {
         Device {
-            server: Server::new(network.master.node, timeout),
+            server: Server::new(network.master.node, timeout).with_block_size(OWN_BLOCK),
             dictionary: Dictionary {
                 description,
                 network,

@@ -161,6 +161,16 @@ fn what_follows_from_the_design_is_read_only() {
     );
 }
 
+/// One segment a block: more would be in the way of the RPDOs.
+#[test]
+fn a_block_download_comes_segment_by_segment() {
+    let mut b = Bench::new();
+    b.expect(
+        [0xC2, 0x0F, 0x20, 0, 100, 0, 0, 0],
+        [0xA4, 0x0F, 0x20, 0, 1, 0, 0, 0],
+    );
+}
+
 #[test]
 fn commands_are_writes() {
     let mut b = Bench::new();
