@@ -12,7 +12,7 @@
 use super::mode::Mode;
 use super::program::{Judged, Refused};
 use super::{
-    AxisMove, Director, FaultCause, Group, GroupEvent, GroupState, Order, Reason, Refusal,
+    AxisMove, Director, FaultCause, Group, GroupEvent, GroupState, Order, Reason, Refusal, next,
 };
 use crate::id::Address;
 use crate::od::Part;
@@ -301,12 +301,13 @@ impl<const N: usize> Panel<N> {
     /// was found impossible when it was planned.
     pub fn on_event(&mut self, event: &GroupEvent) {
         match *event {
-            GroupEvent::Fault {
-                axis: Some(axis),
-                cause,
-            } => {
-                if let Some(fault @ 0) = self.faults.get_mut(usize::from(axis)) {
-                    *fault = code(cause);
+            GroupEvent::Fault { axis, cause } => {
+                // Without an axis it is one of all.
+                let mut axes = axis.map_or(Self::ALL, |axis| 1 << axis);
+                while let Some(axis) = next(&mut axes) {
+                    if let Some(fault @ 0) = self.faults.get_mut(axis) {
+                        *fault = code(cause);
+                    }
                 }
             }
             GroupEvent::State {

@@ -267,6 +267,13 @@ fn the_first_fault_of_an_axis_is_kept_until_it_is_enabled_again() {
     desk.panel.on_event(&fault(0x8611));
     assert_eq!(desk.get(panel::FAULT, 3), 0x0008_7121);
     assert_eq!(desk.get(panel::FAULT, 2), 0);
+    // What is no matter of one axis is one of all.
+    desk.panel.on_event(&GroupEvent::Fault {
+        axis: None,
+        cause: Cause::CyclesLate.with(3),
+    });
+    assert_eq!(desk.get(panel::FAULT, 3), 0x0008_7121);
+    assert_eq!(desk.get(panel::FAULT, 2), 0x000F_0003);
     desk.panel.on_event(&GroupEvent::State {
         from: GroupState::Faulted,
         to: GroupState::Enabling,
