@@ -2,7 +2,7 @@
 
 use canmaster::cia402::{ControlWord, StatusWord};
 use canmaster::motion::mode::Mode;
-use canmaster::motion::{AxisMove, Cause, GroupEvent, GroupState};
+use canmaster::motion::{AxisCommand, AxisMove, Cause, GroupEvent, GroupState, Reason};
 use canmaster::motion::{Order, SetPoint};
 
 use crate::rig::{ALL, AXES, READY, Rig, far};
@@ -130,7 +130,7 @@ fn a_set_point_replaces_the_running_one() {
     let to = |way: i32| SetPoint {
         target: home + way,
         immediately: true,
-        relative: false,
+        ..SetPoint::default()
     };
     assert!(!rig.group.ask(0, &to(60_000)), "it is told to stay first");
     rig.arrive(20);
@@ -145,6 +145,58 @@ fn a_set_point_replaces_the_running_one() {
     assert!(rig.group.ask(0, &to(1000)));
     rig.arrive(2000);
     assert!((rig.drives[0].position - f64::from(home + 1000)).abs() < 5.0);
+}
+
+/// Of axes in several modes all are judged before the first is told anything, and
+/// set-points are handed over in the SYNC in which the paths begin.
+#[test]
+fn modes_side_by_side_are_judged_and_begin_together() {
+    const BEGIN: u16 = 1 << 4;
+    let mut rig = Rig::in_mode(3, Mode::ProfilePosition);
+    rig.order(Order::SetMode {
+        axes: 0b111,
+        mode: Mode::CyclicPosition,
+    });
+    rig.step(READY);
+    rig.until(Standby, 50);
+    rig.released();
+    rig.arrive(20);
+    // The last one takes too long.
+    rig.go(|n| AxisMove {
+        target: if n == 0 { 1 << 29 } else { 1000 },
+        velocity: if n == 0 { 1 } else { 600 },
+        ..far(n)
+    });
+    for _ in 0..50 {
+        rig.step(READY);
+        let told = |command: &AxisCommand| command.controlword & BEGIN != 0;
+        assert!(!rig.commands.iter().any(told), "before it was judged");
+    }
+    let refused = rig.notices.iter().find_map(|notice| match notice {
+        GroupEvent::MoveRefused(why) => Some((why.reason, why.axis)),
+        _ => None,
+    });
+    assert_eq!(refused, Some((Reason::Time, 0)));
+    assert!(rig.group.all_arrived());
+    let places = rig.drives.each_ref().map(|drive| drive.position);
+    let rest = rig.commands;
+    rig.go(far);
+    for (drive, place) in rig.drives.iter().zip(places) {
+        assert!((drive.position - place).abs() < 3.0);
+    }
+    for _ in 0..20 {
+        rig.step(READY);
+        let begun: [bool; AXES] = core::array::from_fn(|n| match n {
+            0..3 => rig.commands[n].target != rest[n].target,
+            _ => rig.commands[n].controlword & BEGIN != 0,
+        });
+        if begun.contains(&true) {
+            assert_eq!(begun, [true; AXES]);
+            rig.arrive(3000);
+            return;
+        }
+    }
+    panic!("{}", rig.last());
 }
 
 /// A drive goes on with its set-point when halt is over (CiA 402-2, 10.3): what was

@@ -15,6 +15,7 @@ impl<const N: usize> Director<N> {
         for leg in &mut self.legs {
             leg.set = None;
         }
+        self.set_points = 0;
     }
 
     /// The legs of a step.
@@ -74,14 +75,10 @@ impl<const N: usize> Director<N> {
         Ok(())
     }
 
-    /// Where the paths will stand when the plan begins, and what is left to the
-    /// drives; `false` if one has not taken its last set-point yet.
+    /// Where the paths will stand when the plan begins, and who gets a set-point; `false`
+    /// if a drive has not taken its last one yet.
     #[inline(never)]
-    pub(super) fn predict(
-        &mut self,
-        group: &mut Group<N>,
-        step: &Step<'_>,
-    ) -> Result<bool, Refused> {
+    pub(super) fn predict(&mut self, group: &Group<N>, step: &Step<'_>) -> Result<bool, Refused> {
         let lead = LEAD + self.later;
         self.start = group.count().wrapping_add(lead);
         for (axis, leg) in self.legs.iter_mut().enumerate() {
@@ -98,17 +95,14 @@ impl<const N: usize> Director<N> {
                     let (mode, allowed) = (mode as u32, Mode::WITH_POSITION);
                     self.error.because(Reason::Mode, mode, allowed)?;
                 }
-            } else if leg.set.is_some() && mode == Mode::ProfilePosition {
-                group.set_ramps(axis, leg.acceleration, leg.deceleration);
-                let set_point = SetPoint {
-                    target: leg.target,
-                    immediately: !self.after,
-                    relative: false,
-                };
-                if !group.ask(axis, &set_point) {
+            } else if mode == Mode::ProfilePosition {
+                if leg.set.take().is_some() {
+                    self.set_points |= 1 << axis;
+                    (leg.up, leg.down) = (leg.acceleration, leg.deceleration);
+                }
+                if self.set_points >> axis & 1 != 0 && !of.takes_set_points() {
                     return Ok(false);
                 }
-                leg.set = None;
             }
         }
         Ok(true)
@@ -180,12 +174,23 @@ impl<const N: usize> Director<N> {
             self.phase = Phase::Plan;
             return;
         }
+        let set_points = if self.path { 0 } else { self.set_points };
+        let after = start.wrapping_sub(group.count());
         for (axis, leg) in self.legs.iter().enumerate() {
-            if axes >> axis & 1 == 0 {
+            if (axes | set_points) >> axis & 1 == 0 {
                 continue;
             }
             group.set_ramps(axis, leg.up, leg.down);
-            if !self.path {
+            if set_points >> axis & 1 != 0 {
+                let set_point = SetPoint {
+                    target: leg.target,
+                    immediately: !self.after,
+                    relative: false,
+                    after,
+                };
+                // It can take one, as the prediction has found.
+                group.ask(axis, &set_point);
+            } else if !self.path {
                 for knot in &leg.knots {
                     group.push(axis, knot);
                 }

@@ -79,6 +79,8 @@ pub struct Director<const N: usize> {
     point: usize,
     period: u32,
     start: u32,
+    /// Axes that get a set-point instead of a path.
+    set_points: u32,
     /// Cycles more than [`LEAD`].
     later: u32,
     /// Cycles until the next look is needed; 0: something happens before.
@@ -105,6 +107,7 @@ impl<const N: usize> Director<N> {
         point: 0,
         period: 0,
         start: 0,
+        set_points: 0,
         later: 0,
         patience: 0,
         error: Refusal::ZERO,

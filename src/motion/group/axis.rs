@@ -293,6 +293,11 @@ impl Axis {
         self.led.rest(holds.then_some(position));
     }
 
+    /// Whether its drive can be given another set-point.
+    pub(in crate::motion) fn takes_set_points(&self) -> bool {
+        self.led.is_taken()
+    }
+
     /// Its drive leads it to `position` by itself.
     pub(super) fn end_at(&mut self, position: i32) {
         self.path.restart(&Point::at_rest(position));

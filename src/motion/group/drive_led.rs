@@ -24,6 +24,9 @@ pub struct SetPoint {
     pub immediately: bool,
     /// It counts from the set-point before.
     pub relative: bool,
+    /// Cycles that it waits: it is handed over with the first set value of a path that
+    /// begins so many steps later.
+    pub after: u32,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,8 +48,8 @@ pub(super) struct DriveLed {
     phase: Phase,
     /// Fresh TPDOs since bit 4 was set.
     seen: u8,
-    /// Cycles since it was asked, or since the drive took the set-point.
-    waited: u32,
+    /// Cycles since it was to be asked, or since the drive took the set-point.
+    waited: i32,
     /// Cycles in which homing has to end.
     limit: u32,
     /// 607Ah.
@@ -74,7 +77,7 @@ impl DriveLed {
     /// A new set-point.
     pub(super) fn ask(&mut self, set_point: &SetPoint) {
         self.phase = Phase::Asked;
-        self.waited = 0;
+        self.waited = (set_point.after as i32).wrapping_neg();
         self.target = set_point.target;
         self.flags = if set_point.immediately {
             IMMEDIATELY
@@ -90,7 +93,7 @@ impl DriveLed {
         self.ask(&SetPoint {
             target: holds.unwrap_or(0),
             immediately: true,
-            relative: false,
+            ..SetPoint::default()
         });
         self.phase = match holds {
             Some(_) => Phase::Set,
@@ -117,14 +120,15 @@ impl DriveLed {
     /// Takes in a statusword, if a fresh one came, `passed` cycles later. `false`: it reports that homing
     /// failed.
     pub(super) fn hear(&mut self, mode: Mode, status: Option<StatusWord>, passed: u32) -> bool {
-        self.waited = self.waited.saturating_add(passed);
+        // What waits for ever is not judged by it.
+        self.waited = self.waited.wrapping_add(passed as i32);
         let Some(status) = status else {
             return true;
         };
         let (flag, reached) = (status.mode_bit_12(), status.target_reached());
         let homing = mode != Mode::ProfilePosition;
         match self.phase {
-            Phase::Asked if homing || !flag => {
+            Phase::Asked if self.waited > 0 && (homing || !flag) => {
                 self.phase = Phase::Set;
                 self.seen = 0;
             }
@@ -154,9 +158,9 @@ impl DriveLed {
         let limit = match (mode, self.phase) {
             (Mode::Homing, _) => self.limit,
             // The drive moves as long as it needs.
-            (_, Phase::Running) => u32::MAX,
+            (_, Phase::Running) => i32::MAX as u32,
             _ => limit,
         };
-        self.waited > limit
+        self.waited > limit as i32
     }
 }
