@@ -177,7 +177,8 @@ fn histogram(late: &[f64]) -> Vec<usize> {
 /// followed at once. That goes for each of several late ones in a row: who counts from
 /// a late SYNC instead of the grid has no such frame. A frame of the master itself is one
 /// only if it had to wait for a frame of a drive: the master begins nothing that would be
-/// in the way. A second SYNC in the same cycle has no excuse.
+/// in the way. A second SYNC in the same cycle has no excuse. What was on the wire before
+/// the first record is not known: whom that could excuse is not counted.
 fn unexplained(records: &[WireRecord], late: &[Late], board: PortId) -> usize {
     let ps = |us: f64| Time((us * PS_PER_US as f64) as u64);
     let before = |place: usize| place.checked_sub(1).and_then(|at| records.get(at));
@@ -185,11 +186,11 @@ fn unexplained(records: &[WireRecord], late: &[Late], board: PortId) -> usize {
     let of_drive = |frame: &WireRecord| !frame.transmitters.contains(&board);
     let excused = |late: &Late| {
         let sync = &records[late.place];
-        before(late.place).is_some_and(|frame| {
+        before(late.place).is_none_or(|frame| {
             let due = sync.sof - ps(late.us) + ps(ON_TIME_US);
             let waited = || {
                 let first = late.place.checked_sub(1).and_then(before);
-                first.is_some_and(|first| of_drive(first) && at_once(first, frame))
+                first.is_none_or(|first| of_drive(first) && at_once(first, frame))
             };
             let allowed = of_drive(frame) || !is_sync(frame) && waited();
             allowed && frame.sof <= due && at_once(frame, sync)

@@ -77,6 +77,18 @@ fn a_frame_of_the_master_itself_is_no_excuse_unless_it_had_to_wait() {
     assert_eq!(figures_of(&records).unexplained, 1);
 }
 
+#[test]
+fn what_was_before_the_records_may_have_been_in_the_way() {
+    let mut records = syncs(100);
+    records[0] = record(1060, 0x080, BOARD);
+    assert_eq!(figures_of(&records).unexplained, 0);
+    records.insert(0, record(960, 0x601, BOARD));
+    assert_eq!(figures_of(&records).unexplained, 0);
+    // It is known that nothing was.
+    records.insert(0, record(500, 0x081, DRIVE));
+    assert_eq!(figures_of(&records).unexplained, 1);
+}
+
 /// SYNCs each `us(n)` late, with a frame that ends where the SYNC begins before those
 /// that `blocked` names.
 fn trace(us: impl Fn(u64) -> u64, blocked: impl Fn(u64) -> bool) -> Vec<WireRecord> {
