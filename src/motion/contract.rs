@@ -90,8 +90,8 @@ const TABLE: [[u8; EVENTS]; STATES] = [
     // Ready NotReady Fault AxesCh Disable Release Stop Halt QuickStop Reset Home Mode  Done  Late
     [ENAB, O,    O,    O,    O,    X,    O,    X,    X,    X,    X,    X,    O,    O   ], // Idle
     [O,    FSTP, FSTP, O,    DISA, X,    O,    X,    DISA, X,    X,    X,    STBY, FSTP], // Enabling
-    [O,    FSTP, FSTP, ENAB, DISA, MOVE, O,    X,    QUIK, X,    HOME, MODE, O,    O   ], // Standby
-    [O,    FSTP, FSTP, O,    STOP, X,    STOP, HALT, QUIK, X,    X,    X,    STBY, FSTP], // Moving
+    [O,    FSTP, FSTP, ENAB, DISA, MOVE, O,    X,    QUIK, X,    X,    MODE, O,    O   ], // Standby
+    [O,    FSTP, FSTP, O,    STOP, X,    STOP, HALT, QUIK, X,    HOME, X,    STBY, FSTP], // Moving
     [O,    FSTP, FSTP, O,    O,    X,    O,    X,    QUIK, X,    X,    X,    STBY, FSTP], // Stopping
     [O,    FSTP, FSTP, O,    STOP, MOVE, STOP, O,    QUIK, X,    X,    X,    O,    FSTP], // Halt
     [O,    FSTP, FSTP, O,    STOP, X,    STOP, STOP, QUIK, X,    X,    X,    STBY, FSTP], // Homing

@@ -218,7 +218,7 @@ pub enum GroupEvent {
     /// A step of the program began.
     StepStarted {
         /// Counted from 0.
-        step: u8,
+        step: u16,
     },
     /// An axis came to rest on its target.
     Arrived {

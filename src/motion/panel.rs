@@ -238,10 +238,13 @@ impl<const N: usize> Panel<N> {
             5 => Order::Halt,
             6 => Order::QuickStop,
             7 => Order::Reset,
-            8 => Order::Home {
-                axes,
-                limit: director.cycles(HOMING),
-            },
+            8 => {
+                if state == GroupState::Moving {
+                    director.is_free(group, why)?;
+                }
+                let limit = director.cycles(HOMING);
+                Order::Home { axes, limit }
+            }
             9 if state == GroupState::Standby => {
                 self.changing = axes;
                 return self.change_modes(group, why);

@@ -447,17 +447,11 @@ fn orders_are_refused_where_the_table_says() {
         axes: ALL,
         limit: 100,
     };
-    let mode = Mode::ProfileVelocity;
-    assert_eq!(
-        rig.group.order(home),
-        Err(Refusal::of(
-            0,
-            Reason::WrongMode,
-            mode as u32,
-            Mode::Homing as u32
-        ))
-    );
+    assert_eq!(rig.group.order(home), Err(Refusal::not_in(Standby)));
     rig.released();
+    let (mode, homing) = (Mode::ProfileVelocity as u32, Mode::Homing as u32);
+    let wrong = Refusal::of(0, Reason::WrongMode, mode, homing);
+    assert_eq!(rig.group.order(home), Err(wrong));
     let cyclic = Order::SetMode {
         axes: ALL,
         mode: Mode::CyclicPosition,

@@ -13,4 +13,5 @@ mod plant;
 mod programs;
 mod random;
 mod rig;
+mod stops;
 mod table;

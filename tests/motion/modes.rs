@@ -2,7 +2,7 @@
 
 use canmaster::cia402::{ControlWord, StatusWord};
 use canmaster::motion::mode::Mode;
-use canmaster::motion::{AxisCommand, AxisMove, Cause, GroupEvent, GroupState, Reason};
+use canmaster::motion::{AxisCommand, AxisMove, Cause, GroupEvent, GroupState, Reason, Refusal};
 use canmaster::motion::{Order, SetPoint};
 
 use crate::rig::{ALL, AXES, READY, Rig, far};
@@ -295,10 +295,20 @@ fn a_deaf_drive_is_named_in_time() {
 #[test]
 fn homing_ends_in_standby_and_targets_count_from_there() {
     let mut rig = Rig::in_mode(5, Mode::Homing);
-    rig.order(Order::Home {
+    let home = Order::Home {
         axes: ALL,
         limit: 500,
-    });
+    };
+    assert_eq!(rig.group.order(home), Err(Refusal::not_in(Standby)));
+    rig.released();
+    // Every axis has to be heard and at rest.
+    rig.silent[2] = true;
+    rig.step(READY);
+    let silent = Refusal::of(2, Reason::NotFresh, 0, 1);
+    assert_eq!(rig.group.order(home), Err(silent));
+    rig.silent[2] = false;
+    rig.step(READY);
+    rig.order(home);
     rig.step(READY);
     assert_eq!(rig.group.state(), Homing);
     rig.until(Standby, 50);
@@ -324,6 +334,7 @@ fn homing_that_fails_or_takes_too_long_is_a_fault() {
         let mut rig = Rig::in_mode(5, Mode::Homing);
         rig.drives[1].homeless = homeless;
         rig.drives[1].deaf = !homeless;
+        rig.released();
         rig.order(Order::Home { axes: ALL, limit });
         rig.until(FaultStop, 100);
         let named = rig.events.iter().any(|event| match event {

@@ -150,13 +150,13 @@ fn a_part_of_the_axes_moves() {
 fn what_the_state_forbids_is_refused_with_the_state() {
     let mut desk = Desk::new();
     let standby = GroupState::Standby as u32;
-    for command in [5, 7, 10, 11] {
+    for command in [5, 7, 8, 10, 11] {
         desk.refused(panel::COMMAND, 0, command, STATE, 0xFF01_0000 | standby);
     }
     desk.command(3);
     desk.until(GroupState::Moving);
     let moving = GroupState::Moving as u32;
-    for command in [3, 7, 8, 9, 12] {
+    for command in [3, 7, 9, 12] {
         desk.refused(panel::COMMAND, 0, command, STATE, 0xFF01_0000 | moving);
     }
     // A refused command is not the last one.
@@ -179,10 +179,10 @@ fn what_no_axis_can_do_is_refused_with_the_axis() {
         let code = mode as u32 & 0xFF;
         desk.refused(panel::MODE, 3, mode, VALUE, 0x0306_0000 | code);
     }
-    // Home is searched in homing mode.
-    desk.refused(panel::COMMAND, 0, 8, STATE, 0x0105_0003);
     desk.command(3);
     desk.until(GroupState::Moving);
+    // Home is searched in homing mode.
+    desk.refused(panel::COMMAND, 0, 8, STATE, 0x0105_0003);
     desk.set(panel::AXES, 0, 0b1000).unwrap();
     desk.set(panel::VELOCITY, 4, 100_000).unwrap();
     desk.set(panel::ACCELERATION, 4, 1000).unwrap();
@@ -195,16 +195,17 @@ fn what_no_axis_can_do_is_refused_with_the_axis() {
 fn what_the_plan_refuses_is_told() {
     let told = |desk: &Desk| format!("{:08X}", desk.get(panel::REFUSAL, 0));
     let mut desk = Desk::new();
-    // The button, which no state but standby obeys.
+    // The button, which obeys while the group comes to rest.
     desk.command(3);
     desk.until(GroupState::Moving);
+    desk.command(4);
+    desk.step(READY);
     let Rig {
         group, director, ..
     } = &mut desk.rig;
     director.press(group);
-    director.press(group);
     desk.step(READY);
-    assert_eq!(told(&desk), "FF070001");
+    assert_eq!(told(&desk), "FF010004");
     // A move that takes too long.
     let mut desk = Desk::new();
     desk.command(3);

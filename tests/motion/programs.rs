@@ -56,7 +56,7 @@ fn shape(flags: u8, value: u32, amplitude: i32, points: &[(u16, i32, i32)]) -> V
     bytes
 }
 
-fn wait(cycles: u32) -> Vec<u8> {
+pub(crate) fn wait(cycles: u32) -> Vec<u8> {
     head(format::WAIT, 0, 0, cycles)
 }
 

@@ -28,7 +28,7 @@ fn leads(state: GroupState, event: Event) -> Option<GroupState> {
         Event::QuickStop if state == Enabling => Some(Disabling),
         Event::QuickStop => (obeys && !matches!(state, QuickStop | Disabling)).then_some(QuickStop),
         Event::Reset => (state == Faulted).then_some(Enabling),
-        Event::Home => (state == Standby).then_some(Homing),
+        Event::Home => (state == Moving).then_some(Homing),
         Event::Mode => (state == Standby).then_some(ModeChange),
         Event::Done => match state {
             Enabling | Moving | Stopping | Homing | ModeChange => Some(Standby),
@@ -76,9 +76,13 @@ fn only_orders_lead_to_motion() {
             let Cell::Go(to) = cell(state, event) else {
                 continue;
             };
-            if matches!(to, Moving | Homing) {
+            if to == Moving {
                 assert!(matches!(state, Standby | Halt), "{event:?} in {state}");
-                assert!(matches!(event, Event::Release | Event::Home));
+                assert_eq!(event, Event::Release);
+            }
+            // Released before.
+            if to == Homing {
+                assert_eq!((state, event), (Moving, Event::Home));
             }
             if state == Faulted {
                 assert_eq!(to, Enabling);
@@ -127,7 +131,7 @@ fn group_in(state: GroupState) -> (Rig, Inputs) {
         Moving => moving(),
         Stopping => after(moving(), Order::Stop),
         Halt => after(moving(), Order::Halt),
-        Homing => after(Rig::in_mode(1, Mode::Homing), HOME),
+        Homing => after(ready_to_home(), HOME),
         ModeChange => {
             let mut rig = Rig::standby(1);
             rig.confirms = false;
@@ -151,6 +155,13 @@ const HOME: Order = Order::Home {
     axes: ALL,
     limit: LIMIT,
 };
+/// Released in homing mode.
+fn ready_to_home() -> Rig {
+    let mut rig = Rig::in_mode(1, Mode::Homing);
+    rig.released();
+    rig
+}
+
 const FAULT: Inputs = Inputs {
     fault: Some((0, Cause::HeartbeatLost.with(0))),
     ..READY
@@ -179,8 +190,8 @@ fn the_group_does_what_every_cell_says() {
     for state in GroupState::ALL {
         for event in Event::ALL {
             let (mut rig, quiet) = group_in(state);
-            if event == Event::Home && state == Standby {
-                rig = Rig::in_mode(1, Mode::Homing);
+            if event == Event::Home && state == Moving {
+                rig = ready_to_home();
             }
             if event == Event::Release && state == Halt {
                 (0..LIMIT).for_each(|_| rig.step(READY));

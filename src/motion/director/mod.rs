@@ -12,7 +12,7 @@ use super::group::{Group, Order};
 use super::mode::Mode;
 use super::plan::Leg;
 use super::program::{Judged, Refusal, Refused};
-use super::{AxisConfig, AxisMove, GroupConfig, GroupEvent, GroupState};
+use super::{AxisConfig, AxisMove, GroupConfig, GroupEvent, GroupState, Reason};
 use crate::time::Duration;
 use heapless::Vec;
 
@@ -44,7 +44,7 @@ enum Phase {
     Waiting,
     /// The group comes to standby, at the end or for an order.
     Finishing,
-    /// The group carries out an order given in step `until`.
+    /// The group carries out an order given at step `until`.
     Ordered,
 }
 
@@ -69,6 +69,8 @@ pub struct Director<const N: usize> {
     flying: bool,
     /// The step before did not wait: a drive that moves by itself finishes it first.
     after: bool,
+    /// Orders to stop that the group had when it was released.
+    stops: u8,
     number: u16,
     config: Option<&'static GroupConfig<N>>,
     /// Where the step that runs begins, and the next one.
@@ -100,6 +102,7 @@ impl<const N: usize> Director<N> {
         path: false,
         flying: false,
         after: false,
+        stops: 0,
         number: 0,
         at: 0,
         next: 0,
@@ -170,6 +173,10 @@ impl<const N: usize> Director<N> {
     #[inline(never)]
     pub(super) fn begin(&mut self, group: &mut Group<N>, why: &mut Refusal) -> Judged {
         let state = group.state();
+        self.heed(group);
+        if self.running && state != GroupState::Halt {
+            return why.busy();
+        }
         if state == GroupState::Moving {
             self.is_free(group, why)?;
         } else {
@@ -180,12 +187,12 @@ impl<const N: usize> Director<N> {
             (self.at, self.number) = (0, 0);
             self.loops.clear();
         }
-        self.phase = Phase::Released;
+        (self.phase, self.stops) = (Phase::Released, group.stops());
         Ok(())
     }
 
     /// Whether it can be told to move.
-    fn is_free(&self, group: &Group<N>, why: &mut Refusal) -> Judged {
+    pub(super) fn is_free(&self, group: &Group<N>, why: &mut Refusal) -> Judged {
         if group.state() != GroupState::Moving {
             return why.state(group.state());
         }
@@ -232,13 +239,17 @@ impl<const N: usize> Director<N> {
             }
         }
         (self.path, self.flying, self.after) = (false, false, false);
-        self.phase = Phase::Plan;
+        (self.phase, self.stops) = (Phase::Plan, group.stops());
         Ok(())
     }
 
-    /// Releases the group for a program; why not, is reported.
+    /// The button: stops a program that runs, whatever the group does for it just now,
+    /// and else releases the group for one; why not, is reported.
     pub fn press(&mut self, group: &mut Group<N>) {
-        if let Err(why) = self.run(group) {
+        if self.running && group.state() != GroupState::Halt {
+            // Never refused.
+            let _ = group.order(Order::Stop);
+        } else if let Err(why) = self.run(group) {
             group.report(GroupEvent::ReleaseRefused(why));
         }
     }
@@ -257,12 +268,20 @@ impl<const N: usize> Director<N> {
     pub fn look(&mut self, group: &mut Group<N>, program: &[u8]) -> bool {
         self.patience = 0;
         let steps = format::steps(program);
+        self.heed(group);
         match (self.phase, group.state()) {
             (Phase::Idle, _) => return false,
-            (_, GroupState::Moving) => self.moving(group),
+            (_, GroupState::Moving) => self.moving(group, steps),
             (Phase::Ordered, GroupState::Homing | GroupState::ModeChange)
             | (Phase::Released, GroupState::Standby | GroupState::Halt) => {}
-            (Phase::Finishing | Phase::Ordered, GroupState::Standby) => self.standby(group, steps),
+            (Phase::Finishing, GroupState::Standby) => self.arrange(group, steps),
+            (Phase::Ordered, GroupState::Standby) => {
+                // The release of the program counts until its end.
+                if group.count() != self.until && group.order(Order::Release).is_ok() {
+                    self.at = self.next;
+                    self.phase = Phase::Released;
+                }
+            }
             // The step that is interrupted begins again with the next release.
             (_, GroupState::Halt) if self.running => {
                 self.number = self.number.saturating_sub(1);
@@ -300,7 +319,14 @@ impl<const N: usize> Director<N> {
         self.running = false;
     }
 
-    fn moving(&mut self, group: &mut Group<N>) {
+    /// A stop ends everything, also one that the state of the group did not need.
+    fn heed(&mut self, group: &Group<N>) {
+        if self.stops != group.stops() {
+            self.end();
+        }
+    }
+
+    fn moving(&mut self, group: &mut Group<N>, steps: &[u8]) {
         match self.phase {
             Phase::Released => {
                 self.next = self.at;
@@ -324,32 +350,21 @@ impl<const N: usize> Director<N> {
             Phase::Waiting if group.count().wrapping_sub(self.until) as i32 >= 0 => {
                 self.phase = Phase::Next;
             }
-            Phase::Finishing if group.all_arrived() => {
-                // Refused only while another order waits.
-                let _ = group.order(Order::Finish);
-            }
+            // Somebody else has released the group again.
+            Phase::Ordered if group.count() != self.until => self.phase = Phase::Next,
+            Phase::Finishing if group.all_arrived() => self.arrange(group, steps),
             _ => {}
         }
     }
 
-    /// In standby in the middle or at the end of a program.
-    fn standby(&mut self, group: &mut Group<N>, steps: &[u8]) {
-        let count = group.count();
-        if self.phase == Phase::Ordered {
-            // The release of the program counts until its end.
-            if count != self.until && group.order(Order::Release).is_ok() {
-                self.at = self.next;
-                self.phase = Phase::Released;
-            }
-            return;
-        }
+    /// At rest in the middle or at the end of a program: what the step needs of the group,
+    /// asked again as long as something else waits there or an axis is not heard.
+    fn arrange(&mut self, group: &mut Group<N>, steps: &[u8]) {
         let step = Step::at(steps, self.at);
-        let axes = step.axes;
+        let (axes, limit) = (step.axes, step.value);
         let order = match (step.kind, Mode::of(step.flags as i8)) {
-            (format::HOME, _) => Order::Home {
-                axes,
-                limit: step.value,
-            },
+            (format::HOME, _) => Order::Home { axes, limit },
+            _ if group.state() != GroupState::Standby => Order::Finish,
             (format::MODE, Some(mode)) => Order::SetMode { axes, mode },
             _ => {
                 self.end();
@@ -357,11 +372,13 @@ impl<const N: usize> Director<N> {
                 return;
             }
         };
-        (self.phase, self.until) = (Phase::Ordered, count);
-        let mut why = Refusal::NONE;
-        if group.accept(order, &mut why).is_err() {
-            self.end();
-            group.report(GroupEvent::ReleaseRefused(why));
+        self.error = Refusal::NONE;
+        let done = group.accept(order, &mut self.error);
+        if done.is_ok() && !matches!(order, Order::Finish) {
+            (self.phase, self.until) = (Phase::Ordered, group.count());
+        }
+        if matches!(self.error.reason, Reason::WrongMode | Reason::NoSuchMode) {
+            self.phase = Phase::Failed;
         }
     }
 
@@ -372,7 +389,7 @@ impl<const N: usize> Director<N> {
         self.next = self.at.saturating_add(step.len());
         if self.at < steps.len() {
             self.number = self.number.saturating_add(1);
-            let step = self.number.wrapping_sub(1) as u8;
+            let step = self.number.wrapping_sub(1);
             group.report(GroupEvent::StepStarted { step });
         }
         self.path = step.kind == format::PATH;

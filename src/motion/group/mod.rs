@@ -78,6 +78,8 @@ pub struct Group<const N: usize> {
     busy: Axes,
     /// What was ordered since the last step; to enable: nothing.
     ordered: Order,
+    /// Orders to stop so far.
+    stops: u8,
     now: Instant,
     axes: [Axis; N],
     events: Events,
@@ -125,6 +127,7 @@ impl<const N: usize> Group<N> {
         staged: 0,
         unwanted: false,
         ordered: Order::Enable,
+        stops: 0,
         announced: 0,
         start: 0,
         stage: Goal::Disabled,
@@ -189,6 +192,12 @@ impl<const N: usize> Group<N> {
         self.count
     }
 
+    /// How often the release was taken back so far, by a stop, a quick stop or a
+    /// disable, whatever the state was; wraps. What was released before is over.
+    pub const fn stops(&self) -> u8 {
+        self.stops
+    }
+
     /// One axis, counted from 0.
     pub fn view(&self, axis: usize) -> Option<AxisView> {
         let bit = bit(axis);
@@ -234,6 +243,11 @@ impl<const N: usize> Group<N> {
         Some(self.axes.get(axis)?.path.ahead(cycles))
     }
 
+    /// Whether it is released, and no order waits that may end that.
+    const fn takes(&self) -> bool {
+        matches!((self.state, self.ordered), (GroupState::Moving, Order::Enable))
+    }
+
     /// In the step number `start` the axes of `axes` go over to a path of which
     /// the knots are pushed from now on. They count as moving from now on.
     ///
@@ -246,7 +260,7 @@ impl<const N: usize> Group<N> {
         let fits =
             |(n, axis): (usize, &Axis)| axes & bit(n) == 0 || axis.path.can_be_replaced(left);
         let fit = self.axes.iter().enumerate().all(fits);
-        if left == 0 || left > FAR || self.state != GroupState::Moving || !fit {
+        if left == 0 || left > FAR || !self.takes() || !fit {
             return Err(TooLate);
         }
         for (n, axis) in self.axes.iter_mut().enumerate() {
@@ -300,7 +314,7 @@ impl<const N: usize> Group<N> {
         let Some(axis) = self.axes.get_mut(axis) else {
             return false;
         };
-        let can = self.state == GroupState::Moving
+        let can = self.takes()
             && axis.mode() == Mode::ProfilePosition
             && axis.led.is_taken();
         if can {

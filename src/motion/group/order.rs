@@ -26,7 +26,7 @@ pub enum Order {
     QuickStop,
     /// Reset the fault and enable.
     Reset,
-    /// Search for home within so many cycles: bit n for axis n.
+    /// Search for home within so many cycles, released and at rest: bit n for axis n.
     Home {
         /// The axes; their mode has to be homing.
         axes: u32,
@@ -76,6 +76,9 @@ impl<const N: usize> Group<N> {
             self.unwanted = false;
             return Ok(());
         };
+        if matches!(event, Event::Disable | Event::Stop | Event::QuickStop) {
+            self.stops = self.stops.wrapping_add(1);
+        }
         if event == Event::Disable {
             self.unwanted = true;
             return Ok(());
@@ -89,7 +92,9 @@ impl<const N: usize> Group<N> {
             return why.state(self.state);
         }
         match order {
-            Order::Finish if self.state != GroupState::Moving || !self.all_arrived() => {
+            Order::Finish | Order::Home { .. }
+                if self.state != GroupState::Moving || !self.all_arrived() =>
+            {
                 return why.busy();
             }
             Order::Stop | Order::QuickStop => {}
@@ -110,27 +115,24 @@ impl<const N: usize> Group<N> {
             Order::Reset if !self.network_ready => return why.because(Reason::Network, 0, 1),
             Order::Release => (0, Mode::Homing),
             Order::SetMode { axes, mode } => (axes, mode),
-            Order::Home { axes, .. } => {
-                look &= axes;
-                (0, Mode::Homing)
-            }
+            Order::Home { axes, .. } => (axes, Mode::Homing),
             _ => return Ok(()),
         };
+        let homes = matches!(order, Order::Home { .. });
         while let Some(n) = next(&mut look) {
             let (Some(of), Some(limits)) = (self.axes.get(n), config.axes.get(n)) else {
                 continue;
             };
-            let (reason, value, allowed) = if matches!(order, Order::Home { .. }) {
-                if of.mode() == Mode::Homing {
-                    continue;
-                }
-                (Reason::WrongMode, of.mode() as u32, Mode::Homing as u32)
-            } else if of.seen & FRESH == 0 {
+            let (reason, value, allowed) = if of.seen & FRESH == 0 {
                 (Reason::NotFresh, 0, 1)
             } else if of.seen & SLOW == 0 {
                 let speed = of.feedback.velocity.unsigned_abs();
                 (Reason::NotAtRest, speed, config.standstill_rpm)
-            } else if wanted & bit(n) != 0 && !other.is_in(limits.modes) {
+            } else if wanted & bit(n) == 0 {
+                continue;
+            } else if homes && of.mode() != other {
+                (Reason::WrongMode, of.mode() as u32, other as u32)
+            } else if !other.is_in(limits.modes) {
                 (Reason::NoSuchMode, other as u32, limits.modes)
             } else {
                 continue;

@@ -273,6 +273,8 @@ impl<'i> Tool<'i> {
             let done = self.world.sdo_write(node, at, &[method]);
             done.with_context(|| format!("node {} refuses the method", node.get()))?;
         }
+        self.command(RELEASE)?;
+        self.until(GroupState::Moving)?;
         self.command(HOME)?;
         self.world.run_until(self.world.now() + FIRST);
         Ok(())
