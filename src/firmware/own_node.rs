@@ -366,7 +366,7 @@ impl OwnNode {
     #[inline(never)]
     pub(crate) fn group(&mut self, event: &GroupEvent) {
         if let GroupEvent::State { to, .. } = event
-            && *to != GroupState::Faulted
+            && *to == GroupState::Enabling
         {
             for code in [MasterError::AXIS_FAULT, MasterError::PDO_MISSING] {
                 self.device.clear_all(code, None);
