@@ -150,7 +150,7 @@ impl<'a> Configurator<'a> {
         let panel = &mut *self.local.panel;
         let plan = self.shared.axes.lock(|axes| {
             if core::mem::take(&mut axes.pressed) {
-                director.press(&mut axes.group);
+                panel.press(&mut axes.group, director);
             }
             panel.poll(&mut axes.group);
             let program = panel.program().unwrap_or(PROGRAM.as_slice());

@@ -300,6 +300,16 @@ impl<const N: usize> Panel<N> {
         }
     }
 
+    /// The button: not while a program is being written.
+    pub fn press(&self, group: &mut Group<N>, director: &mut Director<N>) {
+        if self.loading {
+            let state = group.state();
+            group.report(GroupEvent::ReleaseRefused(Refusal::not_in(state)));
+        } else {
+            director.press(group);
+        }
+    }
+
     /// Takes note of what the group reports: the first fault of each axis, and what
     /// was found impossible when it was planned.
     pub fn on_event(&mut self, event: &GroupEvent) {

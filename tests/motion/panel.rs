@@ -292,6 +292,12 @@ fn a_program_is_taken_piece_by_piece() {
     // Not while it is only half there.
     let standby = GroupState::Standby as u32;
     desk.refused(panel::COMMAND, 0, 12, STATE, 0xFF01_0000 | standby);
+    // Nor by the button.
+    let Desk { rig, panel, .. } = &mut desk;
+    panel.press(&mut rig.group, &mut rig.director);
+    (0..3).for_each(|_| desk.step(READY));
+    assert_eq!(desk.get(panel::REFUSAL, 0) as u32, 0xFF01_0000 | standby);
+    assert_eq!(desk.get(panel::STATE, 0), GroupState::Standby as i32);
     desk.write(3, second, true).unwrap();
     assert_eq!(desk.panel.program(), Some(&program[..]));
     desk.rig.program = program;
