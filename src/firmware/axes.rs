@@ -109,7 +109,12 @@ impl Axes {
     /// Whether there is something for `sdo_configurator`, which looks by itself when
     /// the director is to go on.
     pub(crate) fn has_news(&self) -> bool {
-        self.pressed || self.group.has_events() || self.group.state() == GroupState::ModeChange
+        self.pressed
+            || self.group.has_events()
+            || matches!(
+                self.group.state(),
+                GroupState::ModeChange | GroupState::Enabling
+            )
     }
 
     /// Whether an axis is enabled or led there. What was last heard of a node that

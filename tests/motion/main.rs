@@ -7,6 +7,7 @@ mod compiled;
 mod contract;
 mod faults;
 mod modes;
+mod modes_in_doubt;
 mod panel;
 mod paths;
 mod plant;

@@ -6,7 +6,7 @@ use canmaster::motion::{GroupEvent, GroupState, Order, format};
 
 use crate::compiled::compiled;
 use crate::programs::{program, wait};
-use crate::rig::{AXES, READY, Rig};
+use crate::rig::{ALL, AXES, READY, Rig};
 
 use GroupState::*;
 
@@ -151,4 +151,33 @@ fn steps_are_counted_beyond_255() {
         _ => None,
     });
     assert_eq!(last, Some(299));
+}
+
+/// What a client orders while a search for home waits for its step does not begin.
+#[test]
+fn a_move_and_a_search_for_home_exclude_each_other() {
+    let mut rig = Rig::in_mode(1, Mode::Homing);
+    rig.order(Order::SetMode {
+        axes: 1,
+        mode: Mode::ProfileVelocity,
+    });
+    rig.step(READY);
+    rig.until(Standby, 50);
+    rig.released();
+    let home = Order::Home {
+        axes: ALL & !1,
+        limit: 300,
+    };
+    rig.go(crate::rig::far);
+    rig.step(READY);
+    assert!(rig.group.order(home).is_err(), "an axis moves");
+    rig.order(Order::Stop);
+    rig.step(READY);
+    rig.until(Standby, 300);
+    rig.released();
+    rig.order(home);
+    let start = rig.group.count() + 1;
+    assert!(rig.group.announce(start, 1).is_err(), "home is ordered");
+    rig.until(Standby, 300);
+    assert_eq!(rig.notices, []);
 }

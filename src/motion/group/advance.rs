@@ -22,6 +22,7 @@ impl<const N: usize> Group<N> {
 
     #[inline(never)]
     fn enter(&mut self, to: GroupState) {
+        let Some(config) = self.config else { return };
         let from = core::mem::replace(&mut self.state, to);
         self.since = 0;
         self.events.report(GroupEvent::State { from, to });
@@ -36,11 +37,13 @@ impl<const N: usize> Group<N> {
                 self.excluded = 0;
                 self.coasting = 0;
                 self.busy = 0;
-                self.axes.iter_mut().for_each(Axis::restart);
+                for (axis, limits) in self.axes.iter_mut().zip(&config.axes) {
+                    axis.restart(limits.mode);
+                }
                 self.set_stage(Goal::Disabled);
             }
             GroupState::Disabling => self.set_stage(Goal::Disabled),
-            GroupState::Stopping | GroupState::Halt => self.stop(false),
+            GroupState::Stopping | GroupState::Halt => self.stop(false, config),
             GroupState::FaultStop => {
                 self.network_was_down = false;
                 // Axes that their drives do not hold enabled are excluded; that is
@@ -50,7 +53,7 @@ impl<const N: usize> Group<N> {
                 if from == GroupState::Enabling {
                     self.coasting = self.excluded;
                 }
-                self.stop(true);
+                self.stop(true, config);
             }
             // Where the drives come to rest is theirs to say.
             GroupState::QuickStop => self.hold_actual(),
@@ -61,8 +64,7 @@ impl<const N: usize> Group<N> {
     }
 
     /// Ramps from the next SYNC on, equally long for all axes.
-    fn stop(&mut self, fault: bool) {
-        let Some(config) = self.config else { return };
+    fn stop(&mut self, fault: bool, config: &GroupConfig<N>) {
         let led = self.here() & !self.excluded;
         let mut speeds = [0.0; N];
         let mut fastest = 0.0;
@@ -89,7 +91,7 @@ impl<const N: usize> Group<N> {
 
     fn set_stage(&mut self, stage: Goal) {
         self.stage = stage;
-        self.staged = 0;
+        self.since = 0;
         for axis in &mut self.axes {
             axis.seen &= !REACHED;
             axis.machine.set_goal(stage, self.now);
@@ -107,21 +109,12 @@ impl<const N: usize> Group<N> {
             GroupState::Idle | GroupState::Standby | GroupState::Faulted | GroupState::Halt => {
                 false
             }
-            GroupState::Enabling | GroupState::Disabling => self.next_stage(),
+            GroupState::Enabling | GroupState::Disabling => self.next_stage(config),
             GroupState::Moving | GroupState::Homing => {
                 self.arrive(true, config) && self.state == GroupState::Homing
             }
             GroupState::Stopping => self.arrive(false, config),
-            GroupState::ModeChange => match self.next_wanted() {
-                None => true,
-                Some(ModeWanted { axis, mode }) => {
-                    if self.since > config.cycles(config.enable_timeout) {
-                        let cause = Cause::ModeNotConfirmed.with(mode as i32);
-                        self.fault(Some(axis as u8), cause, Event::Late);
-                    }
-                    false
-                }
-            },
+            GroupState::ModeChange => self.knows_modes(config),
             // The step that begins it has enough to do.
             GroupState::QuickStop | GroupState::FaultStop => {
                 self.since > 0 && self.comes_to_rest(config)
@@ -132,15 +125,33 @@ impl<const N: usize> Group<N> {
         }
     }
 
+    /// Whether 6061h of every axis has shown its mode.
+    #[inline(never)]
+    fn knows_modes(&mut self, config: &GroupConfig<N>) -> bool {
+        let Some(ModeWanted { axis, mode }) = self.next_wanted() else {
+            return true;
+        };
+        if self.since > config.cycles(config.enable_timeout) {
+            let cause = Cause::ModeNotConfirmed.with(mode as i32);
+            self.fault(Some(axis as u8), cause, Event::Late);
+        }
+        false
+    }
+
     /// All axes reach a state before the next transition is commanded.
-    fn next_stage(&mut self) -> bool {
+    fn next_stage(&mut self, config: &GroupConfig<N>) -> bool {
         let here = self.here();
         if here & !self.which(REACHED) != 0 {
             return false;
         }
         let next = match self.stage {
             _ if self.state == GroupState::Disabling => return true,
-            Goal::Disabled => Goal::Ready,
+            Goal::Disabled => {
+                if !self.knows_modes(config) {
+                    return false;
+                }
+                Goal::Ready
+            }
             Goal::Ready => Goal::SwitchedOn,
             Goal::SwitchedOn => Goal::Enabled,
             Goal::Enabled | Goal::QuickStop => {

@@ -140,8 +140,13 @@ impl Axis {
         down: 0,
     };
 
-    /// Forgets what was asked of the drive, before enabling.
-    pub(super) fn restart(&mut self) {
+    /// Forgets what was asked of the drive, before enabling. A change of its mode that
+    /// something came in between of is finished then; and in which mode it is can be taken
+    /// for granted only of that which its configuration gives it: it may have booted.
+    pub(super) fn restart(&mut self, configured: Mode) {
+        if self.mode != Some(configured) {
+            self.wanted = self.wanted.or(self.mode);
+        }
         self.missing = 0;
         self.seen &= !(HEARD | ENABLED);
         self.led = DriveLed::new();
@@ -327,7 +332,7 @@ impl Axis {
     #[inline(never)]
     pub(super) fn stop(&mut self, cycles: u32, speed: f32, config: &AxisConfig) -> f32 {
         self.over = 0;
-        if self.seen & BY_DRIVE != 0 {
+        if self.seen & BY_DRIVE != 0 || self.wanted.is_some() {
             // Its path stands where it is.
             return 0.0;
         }
@@ -390,7 +395,7 @@ impl Axis {
             Lead::Actual => self.target,
             _ => fixed::round(self.sample(END).position),
         };
-        let rests = matches!(lead, Lead::Rest | Lead::Actual);
+        let rests = matches!(lead, Lead::Rest | Lead::Actual) || self.wanted.is_some();
         out.mode = mode;
         out.controlword = word;
         // While the mode changes, bit 4 may begin something in the other one.

@@ -59,10 +59,9 @@ pub struct Group<const N: usize> {
     network_was_down: bool,
     network_ready: bool,
     config: Option<&'static GroupConfig<N>>,
-    /// Steps so far, since the state was entered, and since the stage was set.
+    /// Steps so far, and since the state was entered or the stage was set.
     count: u32,
     since: u32,
-    staged: u32,
     /// Whose path is replaced by one that is announced, and from which step on.
     announced: Axes,
     start: u32,
@@ -124,7 +123,6 @@ impl<const N: usize> Group<N> {
         now: Instant::ZERO,
         count: 0,
         since: 0,
-        staged: 0,
         unwanted: false,
         ordered: Order::Enable,
         stops: 0,
@@ -245,7 +243,10 @@ impl<const N: usize> Group<N> {
 
     /// Whether it is released, and no order waits that may end that.
     const fn takes(&self) -> bool {
-        matches!((self.state, self.ordered), (GroupState::Moving, Order::Enable))
+        matches!(
+            (self.state, self.ordered),
+            (GroupState::Moving, Order::Enable)
+        )
     }
 
     /// In the step number `start` the axes of `axes` go over to a path of which
@@ -310,13 +311,11 @@ impl<const N: usize> Group<N> {
     /// the drive has not taken the last one yet, or the group is not released, or
     /// the axis is in another mode.
     pub fn ask(&mut self, axis: usize, set_point: &SetPoint) -> bool {
-        let bit = bit(axis);
+        let (bit, takes) = (bit(axis), self.takes());
         let Some(axis) = self.axes.get_mut(axis) else {
             return false;
         };
-        let can = self.takes()
-            && axis.mode() == Mode::ProfilePosition
-            && axis.led.is_taken();
+        let can = takes && axis.mode() == Mode::ProfilePosition && axis.led.is_taken();
         if can {
             axis.led.ask(set_point);
             // What comes next counts from there.
@@ -339,14 +338,19 @@ impl<const N: usize> Group<N> {
 
     /// The next axis whose mode has to be written and confirmed.
     pub fn mode_wanted(&self) -> Option<ModeWanted> {
-        if self.state != GroupState::ModeChange || self.since < TARGET_SETTLED {
+        let changes = matches!(self.state, GroupState::ModeChange | GroupState::Enabling);
+        if !changes || self.since < TARGET_SETTLED {
             return None;
         }
         self.next_wanted()
     }
 
     fn next_wanted(&self) -> Option<ModeWanted> {
-        let wanted = |(axis, a): (usize, &Axis)| a.wanted.map(|mode| ModeWanted { axis, mode });
+        let here = self.here();
+        let wanted = |(axis, a): (usize, &Axis)| {
+            let mode = a.wanted.filter(|_| here & bit(axis) != 0)?;
+            Some(ModeWanted { axis, mode })
+        };
         self.axes.iter().enumerate().find_map(wanted)
     }
 
@@ -374,7 +378,6 @@ impl<const N: usize> Group<N> {
         let us = config.cycle.as_micros().saturating_mul(passed);
         self.now += Duration::from_micros(us);
         self.since = self.since.saturating_add(passed);
-        self.staged = self.staged.saturating_add(passed);
         let mut cut = self.count_on();
         for _ in 1..passed.min(CAUGHT_UP_MAX) {
             for (n, axis) in self.axes.iter_mut().enumerate() {

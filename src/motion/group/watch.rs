@@ -23,7 +23,7 @@ impl<const N: usize> Group<N> {
             _ => {}
         }
         let leads = matches!(state, GroupState::Enabling | GroupState::Disabling);
-        let late = leads && self.staged > config.cycles(config.enable_timeout);
+        let late = leads && self.since > config.cycles(config.enable_timeout);
         let mut look = self.here();
         if leads {
             let late = if late { !self.which(REACHED) } else { 0 };
