@@ -18,6 +18,9 @@ fn homing_run() -> Vec<u8> {
     compiled(text).bytes()
 }
 
+/// What somebody does to stop it.
+type Stops = fn(&mut Rig);
+
 /// Cycles that the run takes, and then some.
 const COURSE: u32 = 150;
 
@@ -70,8 +73,7 @@ fn a_stop_in_any_cycle_of_a_program_ends_it() {
         rig.step(READY);
         rig.order(Order::Enable);
     };
-    let kinds: [(&str, fn(&mut Rig)); 3] =
-        [("stop", stop), ("button", press), ("disable", off_and_on)];
+    let kinds: [(&str, Stops); 3] = [("stop", stop), ("button", press), ("disable", off_and_on)];
     for (name, order) in kinds {
         let mut seen = Vec::new();
         for cycle in 1..COURSE {
