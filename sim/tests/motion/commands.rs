@@ -1,100 +1,18 @@
 //! The group led over CAN: a client on the bus enables, releases, moves and stops it by
 //! SDO, changes modes, loads a program and follows it by the board's own TPDOs.
 
-mod common;
-
 use canmaster::id::Address;
 use canmaster::motion::{GroupState, panel};
 use canmaster::sdo::{AbortCode, Protocol, SdoError};
 use canmaster::{CobId, Frame, NodeId};
-use canmaster_network::Source;
 use canmaster_sim::judge::coordination;
 use canmaster_sim::time::Time;
-use canmaster_sim::world::{Client, Scenario, World, enabled};
+use canmaster_sim::world::{Scenario, enabled};
 
-use common::image;
-
-const MASTER: NodeId = NodeId::constant::<127>();
-const END: Time = Time::from_ms(60_000);
-const AXES: u8 = 6;
-
-const ENABLE: u32 = 1;
-const DISABLE: u32 = 2;
-const RELEASE: u32 = 3;
-const STOP: u32 = 4;
-const HALT: u32 = 5;
-const SET_MODES: u32 = 9;
-const START: u32 = 10;
-const RUN: u32 = 12;
-
-fn client(scenario: Scenario) -> Client<'static> {
-    let world = World::new(image(), scenario.unattended()).unwrap();
-    Client::new(world, MASTER)
-}
-
-fn in_standby(seed: u64) -> Client<'static> {
-    let mut client = client(Scenario::new(seed, END));
-    assert!(client.world.run_to(Time::from_ms(4000), all_enabled));
-    until(&mut client, GroupState::Standby);
-    client
-}
-
-fn all_enabled(world: &World<'_>) -> bool {
-    world.statuses().flatten().all(|status| enabled(&status))
-}
-
-fn command(client: &mut Client<'_>, command: u32) -> Result<(), SdoError> {
-    client.put(panel::COMMAND, 0, command, 2)
-}
-
-fn state(client: &mut Client<'_>) -> u32 {
-    client.number(panel::STATE, 0).unwrap()
-}
-
-#[track_caller]
-fn until(client: &mut Client<'_>, wanted: GroupState) {
-    for _ in 0..1000 {
-        if state(client) == wanted as u32 {
-            return;
-        }
-        client.listen(Time::from_ms(5));
-    }
-    panic!("{wanted} is not reached: {}", state(client));
-}
-
-/// Refused, and why: 2002h.
-#[track_caller]
-fn refused(client: &mut Client<'_>, done: Result<(), SdoError>, code: AbortCode, why: u32) {
-    match done {
-        Err(SdoError::Aborted { code: told, .. }) => assert_eq!(told, code),
-        other => panic!("{other:?}"),
-    }
-    let told = client.number(panel::REFUSAL, 0).unwrap();
-    assert_eq!(format!("{told:08X}"), format!("{why:08X}"));
-}
-
-fn positions(client: &mut Client<'_>) -> Vec<i32> {
-    let mut all = Vec::new();
-    for axis in 1..=AXES {
-        all.push(client.number(panel::POSITION, axis).unwrap() as i32);
-    }
-    all
-}
-
-fn put_targets(client: &mut Client<'_>, target: i32) {
-    for axis in 1..=AXES {
-        client.put(panel::TARGET, axis, target as u32, 4).unwrap();
-        client.put(panel::VELOCITY, axis, 1200, 4).unwrap();
-        client.put(panel::ACCELERATION, axis, 2000, 4).unwrap();
-    }
-}
-
-#[track_caller]
-fn arrived(client: &mut Client<'_>, from: &[i32], way: i32) {
-    for (now, from) in positions(client).iter().zip(from) {
-        assert!((now - from - way).abs() <= 3, "{now} from {from}");
-    }
-}
+use crate::leader::{
+    AXES, DISABLE, ENABLE, END, HALT, RELEASE, RUN, SET_MODES, START, STOP, all_enabled, arrived, command, compiled,
+    emergencies, in_standby, positions, put_targets, refused, run, state, until, until_done,
+};
 
 #[test]
 fn enable_release_move_and_stop_by_sdo() {
@@ -227,9 +145,7 @@ fn from_every_mode_to_every_other() {
                 .map(|status| status.mode)
                 .all(|shown| shown == mode as i8)
         );
-        let heard = client.take_heard();
-        let emergency = |(_, frame): &&(Time, Frame)| (0x081..0x100).contains(&frame.id().get());
-        let said: Vec<_> = heard.iter().filter(emergency).collect();
+        let said = emergencies(&mut client);
         assert!(said.is_empty(), "mode {mode}: {said:?}");
     }
 }
@@ -250,21 +166,8 @@ fn profile_position_is_relative_buffered_and_immediate() {
     let ways = [3, -2, 3, -3, 2, -2];
     let mut from = positions(&mut client);
     for settle in [true, false] {
-        let at = Address::new(panel::PROGRAM, 0);
-        client.write(at, &program(settle), Protocol::Block).unwrap();
-        command(&mut client, RUN).unwrap();
-        let mut standby = 0;
-        for _ in 0..800 {
-            client.listen(Time::from_ms(10));
-            standby = match state(&mut client) == GroupState::Standby as u32 {
-                true => standby + 1,
-                false => 0,
-            };
-            if standby > 20 {
-                break;
-            }
-        }
-        assert!(standby > 20, "{}", state(&mut client));
+        run(&mut client, &program(settle));
+        until_done(&mut client, Time::from_ms(8000));
         let now = positions(&mut client);
         for ((from, now), way) in from.iter().zip(&now).zip(ways) {
             let off = now - from - 2000 * way;
@@ -337,7 +240,7 @@ fn what_a_drive_lacks_or_a_missing_one_forbids_is_refused() {
     let done = client.put(panel::AXES, 0, 0x7F, 4);
     refused(&mut client, done, AbortCode::VALUE_RANGE, 0xFF08_007F);
 
-    let mut client = self::client(Scenario::new(44, END).without(NodeId::constant::<3>()));
+    let mut client = crate::leader::client(Scenario::new(44, END).without(NodeId::constant::<3>()));
     client.listen(Time::from_ms(4000));
     assert_eq!(state(&mut client), GroupState::Idle as u32);
     for order in [RELEASE, RUN] {
@@ -452,17 +355,4 @@ fn a_program_is_downloaded_by_block_and_segmented_transfer_and_run() {
             "axis {axis}: {now} from {from}"
         );
     }
-}
-
-/// The bytes of a program in TOML for the sample.
-fn compiled(text: &str) -> Vec<u8> {
-    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../network.toml");
-    let machine = canmaster_network::load(file.as_ref()).machine.unwrap();
-    let source = Source::new("one.toml", text.as_bytes());
-    let outcome = canmaster_network::program::read(&source, &machine);
-    let problems: Vec<String> = outcome.problems.iter().map(ToString::to_string).collect();
-    let program = outcome.program;
-    program
-        .unwrap_or_else(|| panic!("{}", problems.join("\n")))
-        .bytes()
 }

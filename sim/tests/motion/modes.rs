@@ -1,0 +1,128 @@
+//! Motion in each mode: all axes start in one SYNC, arrive where they have to, and no
+//! drive complains.
+
+use canmaster::motion::mode::Mode;
+use canmaster::motion::{Cause, GroupState, panel};
+use canmaster_sim::judge::{STANDSTILL_RPM, coordination};
+use canmaster_sim::time::Time;
+use canmaster_sim::world::Client;
+
+use crate::leader::{
+    AXES, RELEASE, START, STOP, command, compiled, emergencies, fastest, fault, in_standby,
+    positions, put_targets, run, set_modes, start, state, until, until_done,
+};
+
+const ALL: u32 = (1 << AXES) - 1;
+
+/// Another way for each axis, increments.
+const WAYS: [i32; AXES as usize] = [12_000, -9000, 15_000, -12_000, 6000, -15_000];
+
+#[track_caller]
+fn stand(client: &mut Client<'_>, expected: &[i32], mode: Mode) {
+    let now = positions(client);
+    for (n, (now, expected)) in now.iter().zip(expected).enumerate() {
+        let off = now - expected;
+        assert!(off.abs() <= 2, "{mode:?}, axis {}: {off}", n + 1);
+    }
+}
+
+#[test]
+fn axes_arrive_in_every_mode_that_has_a_position() {
+    for (seed, mode) in [
+        (91, Mode::ProfileVelocity),
+        (92, Mode::CyclicVelocity),
+        (93, Mode::CyclicPosition),
+        (94, Mode::ProfilePosition),
+    ] {
+        let mut client = in_standby(seed);
+        set_modes(&mut client, ALL, mode as u8);
+        emergencies(&mut client);
+        let from = positions(&mut client);
+        put_targets(&mut client, 0);
+        for (axis, way) in (1..).zip(WAYS) {
+            client.put(panel::TARGET, axis, way as u32, 4).unwrap();
+        }
+        start(&mut client);
+        client.listen(Time::from_ms(1800));
+        let ends: Vec<i32> = from.iter().zip(WAYS).map(|(from, way)| from + way).collect();
+        stand(&mut client, &ends, mode);
+        // A set-point of profile position says only where to.
+        if mode != Mode::ProfilePosition {
+            let wire = [client.world.wire()];
+            let network = client.world.machine().network();
+            let spans = coordination::spans(wire.into_iter(), network);
+            let starts = spans.iter().map(|span| span.start.sync);
+            let apart = starts.clone().max().unwrap() - starts.min().unwrap();
+            assert!(apart <= 8, "{mode:?}: {apart}");
+        }
+        command(&mut client, STOP).unwrap();
+        until(&mut client, GroupState::Standby);
+        client.listen(Time::from_ms(300));
+        stand(&mut client, &ends, mode);
+        assert_eq!(emergencies(&mut client), [], "{mode:?}");
+    }
+}
+
+/// In every mode the axes stay where a stop has brought them to rest, in standby and
+/// when they are released again.
+#[test]
+fn a_stop_on_the_way_ends_the_motion_for_good() {
+    for (seed, mode) in [
+        (95, Mode::CyclicVelocity),
+        (96, Mode::CyclicPosition),
+        (97, Mode::ProfilePosition),
+    ] {
+        let mut client = in_standby(seed);
+        set_modes(&mut client, ALL, mode as u8);
+        emergencies(&mut client);
+        put_targets(&mut client, 60_000);
+        start(&mut client);
+        client.listen(Time::from_ms(900));
+        assert!(fastest(&client.world) > 1000.0, "{mode:?}");
+        command(&mut client, STOP).unwrap();
+        until(&mut client, GroupState::Standby);
+        let rest = positions(&mut client);
+        client.listen(Time::from_ms(400));
+        stand(&mut client, &rest, mode);
+        command(&mut client, RELEASE).unwrap();
+        until(&mut client, GroupState::Moving);
+        client.listen(Time::from_ms(400));
+        stand(&mut client, &rest, mode);
+        assert_eq!(emergencies(&mut client), [], "{mode:?}");
+        let record = client.world.finish();
+        for axis in &record.axes {
+            assert_eq!(axis.motion.unreleased(), None, "{mode:?}");
+        }
+    }
+}
+
+/// Per mille of the rated torque: the axes are driven, and without torque they come to
+/// rest by themselves.
+#[test]
+fn torque_follows_its_path() {
+    let mut client = in_standby(98);
+    set_modes(&mut client, ALL, Mode::CyclicTorque as u8);
+    emergencies(&mut client);
+    let from = positions(&mut client);
+    let program = compiled(
+        "[[step]]\nsettle = false\n[[step.move]]\nto = [90, -90, 90, -90, 90, -90]\n\
+         velocity = 600\nacceleration = 6000\n\
+         [[step]]\nwait_ms = 100\n\
+         [[step]]\n[[step.move]]\nto = 0\nvelocity = 600\nacceleration = 6000\n",
+    );
+    run(&mut client, &program);
+    until(&mut client, GroupState::Moving);
+    assert!(client.world.run_to(Time::MAX, |world| fastest(world) > 200.0));
+    println!("{} {}", client.world.now(), fastest(&client.world));
+    for _ in 0..100 {
+        client.listen(Time::from_ms(20));
+        println!("{} {} {} {}", client.world.now(), state(&mut client), fastest(&client.world), client.number(panel::REFERENCE, 1).unwrap());
+    }
+    until_done(&mut client, Time::from_ms(6000));
+    let now = positions(&mut client);
+    println!("{from:?} {now:?}");
+    assert!(fastest(&client.world) <= STANDSTILL_RPM);
+    assert_eq!(emergencies(&mut client), []);
+    assert_eq!(fault(&mut client, 1), (0, 0));
+    let _ = (START, Cause::Emergency);
+}
