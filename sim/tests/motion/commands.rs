@@ -10,8 +10,9 @@ use canmaster_sim::time::Time;
 use canmaster_sim::world::{Scenario, enabled};
 
 use crate::leader::{
-    AXES, DISABLE, ENABLE, END, HALT, RELEASE, RUN, SET_MODES, START, STOP, all_enabled, arrived, command, compiled,
-    emergencies, in_standby, positions, put_targets, refused, run, state, until, until_done,
+    AXES, DISABLE, ENABLE, END, HALT, RELEASE, RUN, SET_MODES, START, STOP, all_enabled, arrived,
+    command, compiled, emergencies, in_standby, positions, put_targets, refused, run, state, until,
+    until_done,
 };
 
 #[test]

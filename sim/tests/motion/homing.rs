@@ -12,11 +12,10 @@ use canmaster_sim::time::Time;
 use canmaster_sim::world::{Client, Scenario};
 
 use crate::leader::{
-    AXES, END, HALT, QUICK_STOP, RESET, STOP, all_enabled, command, compiled, emergencies, fastest,
-    fault, home, positions, ready, run, set_modes, state, until,
+    ALL, AXES, END, HALT, QUICK_STOP, RESET, STOP, all_enabled, command, compiled, emergencies,
+    fastest, fault, home, positions, ready, run, set_modes, state, until,
 };
 
-const ALL: u32 = (1 << AXES) - 1;
 const HOMING: u8 = Mode::Homing as u8;
 
 /// Limit switches at both ends with hard stops behind them, a home switch in between,
@@ -77,9 +76,15 @@ fn every_method_finds_its_zero() {
     let mut client = searching(81, with_switches);
     for (methods, zeros) in [
         // The hard stops, and the index off them; where it is; the home switch.
-        ([-1, -2, -3, -4, 37, 7], [4700.0, -5300.0, 6000.0, -6000.0, 0.0, -1300.0]),
+        (
+            [-1, -2, -3, -4, 37, 7],
+            [4700.0, -5300.0, 6000.0, -6000.0, 0.0, -1300.0],
+        ),
         // Limit and home switches, with and without the index.
-        ([1, 2, 11, 17, 18, 23], [-3300.0, 4700.0, 2700.0, -5000.0, 5000.0, -1000.0]),
+        (
+            [1, 2, 11, 17, 18, 23],
+            [-3300.0, 4700.0, 2700.0, -5000.0, 5000.0, -1000.0],
+        ),
     ] {
         use_methods(&mut client, methods);
         emergencies(&mut client);
@@ -91,14 +96,18 @@ fn every_method_finds_its_zero() {
         let truths = client.world.truths().flatten();
         for (n, truth) in truths.enumerate() {
             let method = methods[n];
-                let zero = truth.position_inc - f64::from(told[n]);
+            let zero = truth.position_inc - f64::from(told[n]);
             assert!(told[n].abs() <= 2, "method {method}: {}", told[n]);
             assert!((zero - zeros[n]).abs() <= 10.0, "method {method}: {zero}");
         }
     }
     let referenced = client.world.statuses().flatten();
     // Bit 15: position referenced to home position (EPOS4).
-    assert!(referenced.map(|status| status.statusword).all(|word| word & 0x8000 != 0));
+    assert!(
+        referenced
+            .map(|status| status.statusword)
+            .all(|word| word & 0x8000 != 0)
+    );
 }
 
 /// How a search is ended.
@@ -122,7 +131,10 @@ fn a_search_that_finds_nothing_is_ended() {
         match by {
             By::Order(_) => home(&mut client),
             By::Limit => {
-                run(&mut client, &compiled("[[step]]\n[step.home]\nlimit_ms = 800\n"));
+                run(
+                    &mut client,
+                    &compiled("[[step]]\n[step.home]\nlimit_ms = 800\n"),
+                );
                 until(&mut client, GroupState::Homing);
             }
         }
@@ -136,7 +148,11 @@ fn a_search_that_finds_nothing_is_ended() {
         assert!(fastest(&client.world) <= STANDSTILL_RPM, "{by:?}");
         client.listen(Time::from_ms(300));
         assert!(fastest(&client.world) <= STANDSTILL_RPM, "{by:?}");
-        assert_eq!(all_enabled(&client.world), ends == GroupState::Standby, "{by:?}");
+        assert_eq!(
+            all_enabled(&client.world),
+            ends == GroupState::Standby,
+            "{by:?}"
+        );
         let cause = match by {
             By::Limit => (Cause::NotDone as u32, HOMING.into()),
             By::Order(_) => (0, 0),
@@ -180,7 +196,9 @@ fn the_others_keep_still() {
     let before = positions(&mut client);
     client.put(panel::AXES, 0, 0b10, 4).unwrap();
     home(&mut client);
-    client.world.run_until(client.world.now() + Time::from_ms(300));
+    client
+        .world
+        .run_until(client.world.now() + Time::from_ms(300));
     for (n, truth) in client.world.truths().flatten().enumerate() {
         assert_eq!(truth.velocity_rpm.abs() > 30.0, n == 1, "axis {}", n + 1);
     }

@@ -17,6 +17,8 @@ use crate::common::image;
 const MASTER: NodeId = NodeId::constant::<127>();
 pub(crate) const END: Time = Time::from_ms(60_000);
 pub(crate) const AXES: u8 = 6;
+/// For 2003h.
+pub(crate) const ALL: u32 = (1 << AXES) - 1;
 
 pub(crate) const ENABLE: u32 = 1;
 pub(crate) const DISABLE: u32 = 2;
@@ -162,7 +164,10 @@ pub(crate) fn fault(client: &mut Client<'_>, axis: u8) -> (u32, u32) {
 
 /// Speeds of the shafts, rpm.
 pub(crate) fn fastest(world: &World<'_>) -> f64 {
-    let speeds = world.truths().flatten().map(|truth| truth.velocity_rpm.abs());
+    let speeds = world
+        .truths()
+        .flatten()
+        .map(|truth| truth.velocity_rpm.abs());
     speeds.fold(0.0, f64::max)
 }
 
@@ -219,6 +224,6 @@ pub(crate) fn compiled(text: &str) -> Vec<u8> {
 /// Writes a program to the board and lets it run.
 pub(crate) fn run(client: &mut Client<'_>, program: &[u8]) {
     let at = Address::new(panel::PROGRAM, 0);
-    client.write(at, program, Protocol::Normal).unwrap();
+    client.write(at, program, Protocol::Block).unwrap();
     command(client, RUN).unwrap();
 }

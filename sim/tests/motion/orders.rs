@@ -204,7 +204,9 @@ fn a_jerk_makes_a_move_softer_and_longer() {
         start(&mut client);
         assert!(client.world.run_to(Time::MAX, |world| !stands(world)));
         let begun = client.world.now();
-        client.world.run_until(begun + Time::from_secs_f64(built_up));
+        client
+            .world
+            .run_until(begun + Time::from_secs_f64(built_up));
         let way = client.world.truths().flatten().next().unwrap().position_inc - f64::from(from);
         assert!(client.world.run_to(Time::MAX, stands));
         took.push((client.world.now() - begun).as_secs_f64());
@@ -217,7 +219,10 @@ fn a_jerk_makes_a_move_softer_and_longer() {
             ACCELERATION * (before + built_up).powi(2) / 2.0
         };
         let expected = expected * UNIT;
-        assert!((way.abs() - expected).abs() < expected * 0.05, "{way}, {expected}");
+        assert!(
+            (way.abs() - expected).abs() < expected * 0.05,
+            "{way}, {expected}"
+        );
         client.listen(Time::from_ms(200));
         command(&mut client, STOP).unwrap();
         until(&mut client, GroupState::Standby);
@@ -266,7 +271,9 @@ fn cycles_that_are_late_are_told_of_every_axis() {
     client.listen(Time::from_ms(600));
     let irq = irqs::TIM3;
     client.world.apply(Stimulus::Hang { irq });
-    client.world.run_until(client.world.now() + Time::from_ms(20));
+    client
+        .world
+        .run_until(client.world.now() + Time::from_ms(20));
     client.world.apply(Stimulus::Resume { irq });
     until(&mut client, GroupState::Faulted);
     at_rest(&client);

@@ -53,7 +53,11 @@ fn ran(seed: u64, program: &Program) -> Ran {
     let takes = Time::from_us(course.cycles * u64::from(group.cycle_us));
     until_done(&mut client, takes + LATE);
     assert_eq!(emergencies(&mut client), []);
-    assert_eq!(client.number(panel::STEP, 0), Ok(0), "no step runs any more");
+    assert_eq!(
+        client.number(panel::STEP, 0),
+        Ok(0),
+        "no step runs any more"
+    );
     for axis in 1..=AXES {
         assert_eq!(client.number(panel::FAULT, axis), Ok(0), "axis {axis}");
     }
@@ -76,7 +80,11 @@ fn ran(seed: u64, program: &Program) -> Ran {
     for (axis, now) in positions(&mut client).into_iter().enumerate() {
         let target = parts[axis].last().map_or(0, |(_, part)| part.target);
         let off = now - homes[axis] - target;
-        assert!(i64::from(off.abs()) <= FINAL_ERROR, "axis {}: {now}", axis + 1);
+        assert!(
+            i64::from(off.abs()) <= FINAL_ERROR,
+            "axis {}: {now}",
+            axis + 1
+        );
     }
     let record = client.world.finish();
     let ran = Ran { record, parts };
@@ -149,7 +157,11 @@ impl Ran {
             let mut from = self.home(axis);
             for (n, &(movement, step, _, target)) in made.iter().enumerate() {
                 let error = movement.error(target);
-                assert!(error <= FINAL_ERROR, "axis {}, step {step}: {error}", axis + 1);
+                assert!(
+                    error <= FINAL_ERROR,
+                    "axis {}, step {step}: {error}",
+                    axis + 1
+                );
                 let way = f64::from((target - from).signum());
                 let next = made.get(n + 1).map_or(Time::MAX, |next| next.0.started);
                 let trace = self.motion(axis).trace().iter();
@@ -176,7 +188,14 @@ impl Ran {
 #[test]
 fn there_are_no_other_programs() {
     let files = fs::read_dir(folder()).unwrap();
-    let name = |file: fs::DirEntry| file.path().file_stem().unwrap().to_str().unwrap().to_string();
+    let name = |file: fs::DirEntry| {
+        file.path()
+            .file_stem()
+            .unwrap()
+            .to_str()
+            .unwrap()
+            .to_string()
+    };
     let mut names: Vec<String> = files.map(|file| name(file.unwrap())).collect();
     names.sort();
     assert_eq!(names, PROGRAMS);

@@ -6,17 +6,17 @@ use canmaster::id::Address;
 use canmaster::motion::mode::Mode;
 use canmaster::motion::{Cause, GroupState, panel};
 use canmaster_sim::drive::cia402::State;
-use canmaster_sim::drive::{DriveConfig, DriveFault, Spread, Trouble};
+use canmaster_sim::drive::{DriveConfig, DriveFault, DriveStatus, PlantState, Spread, Trouble};
 use canmaster_sim::judge::STANDSTILL_RPM;
+use canmaster_sim::log::{Level, LogLine};
 use canmaster_sim::time::Time;
-use canmaster_sim::world::{Client, Scenario, Stimulus};
+use canmaster_sim::world::{Client, Scenario, Stimulus, enabled};
 
 use crate::leader::{
-    AXES, DISABLE, ENABLE, END, HALT, QUICK_STOP, RELEASE, SET_MODES, START, STOP, command,
-    compiled, fastest, fault, put_targets, ready, run, set_modes, start, state, until,
+    ALL, AXES, DISABLE, ENABLE, END, HALT, QUICK_STOP, RELEASE, SET_MODES, START, STOP, command,
+    compiled, fault, put_targets, ready, run, set_modes, start, state, until,
 };
 
-const ALL: u32 = (1 << AXES) - 1;
 const NODE: NodeId = NodeId::constant::<4>();
 const AXIS: u8 = 4;
 
@@ -51,7 +51,6 @@ fn trouble(client: &mut Client<'_>, fault: DriveFault) {
 
 /// Brings the group there, with what is wrong.
 fn lead(client: &mut Client<'_>, to: In, fault: DriveFault) {
-    let home = compiled("[[step]]\n[step.home]\nlimit_ms = 700\n");
     match to {
         In::Enabling => {
             command(client, DISABLE).unwrap();
@@ -66,20 +65,24 @@ fn lead(client: &mut Client<'_>, to: In, fault: DriveFault) {
         }
         In::ModeChange => {
             for axis in 1..=AXES {
-                client.put(panel::MODE, axis, Mode::CyclicPosition as u32, 1).unwrap();
+                let mode = Mode::CyclicPosition as u32;
+                client.put(panel::MODE, axis, mode, 1).unwrap();
             }
             trouble(client, fault);
             command(client, SET_MODES).unwrap();
         }
         In::Homing => {
+            let limit = compiled("[[step]]\n[step.home]\nlimit_ms = 700\n");
             for axis in 1..=AXES {
+                // Where it is; and what this one never finds.
+                let method = if axis == AXIS { 23 } else { 37 };
                 let node = NodeId::new(axis).unwrap();
                 let at = Address::new(0x6098, 0);
-                client.world.sdo_write(node, at, &[23]).unwrap();
+                client.world.sdo_write(node, at, &[method]).unwrap();
             }
-            set_modes(client, ALL, Mode::Homing as u8);
-            run(client, &home);
+            run(client, &limit);
             until(client, GroupState::Homing);
+            client.listen(Time::from_ms(200));
             trouble(client, fault);
         }
         In::SetPoint => {
@@ -97,57 +100,80 @@ fn lead(client: &mut Client<'_>, to: In, fault: DriveFault) {
             put_targets(client, 60_000);
             start(client);
             client.listen(Time::from_ms(600));
-            let order = match to {
+            if to == In::SetPointStop {
+                trouble(client, fault);
+            }
+            let (order, state) = match to {
                 In::Moving => return trouble(client, fault),
-                In::Halt => HALT,
-                In::QuickStop => QUICK_STOP,
-                In::SetPointStop => {
-                    trouble(client, fault);
-                    return command(client, STOP).unwrap();
-                }
-                _ => STOP,
+                In::Halt => (HALT, GroupState::Halt),
+                In::QuickStop => (QUICK_STOP, GroupState::QuickStop),
+                _ => (STOP, GroupState::Stopping),
             };
             command(client, order).unwrap();
-            if to == In::Halt {
-                client.listen(Time::from_ms(900));
+            until(client, state);
+            match to {
+                In::SetPointStop => return,
+                In::Halt => client.listen(Time::from_ms(900)),
+                _ => {}
             }
             trouble(client, fault);
         }
     }
 }
 
-/// What came of it: the state, and the cause that 200Eh has of the axis.
-fn struck(seed: u64, to: In, fault_is: DriveFault) -> (u32, u32, Vec<String>) {
+/// It ends like this, with that cause in 200Eh of the axis; of the others with none.
+/// All of them are at rest then, or all but the one that obeys no more.
+fn ends(seed: u64, to: In, fault_is: DriveFault, end: GroupState, cause: Option<Cause>) {
+    // It hears nothing and goes on with its search; it has no supply and coasts.
+    let deaf = (to, fault_is) == (In::Homing, DEAF);
+    let gone_wild = deaf || cause == Some(Cause::TpdoMissing);
     let scenario = Scenario::new(seed, END).tuned(endless);
     let mut client = ready(scenario);
     lead(&mut client, to, fault_is);
-    let mut seen = Vec::new();
-    let mut last = u32::MAX;
-    let begun = client.world.now();
-    let mut at = begun;
-    while client.world.now() < at + Time::from_ms(3000) {
-        let now = state(&mut client);
-        if now != last {
-            seen.push(format!("{} {now}", client.world.now() - begun));
-            last = now;
-            at = client.world.now();
-        }
-        client.listen(Time::from_ms(10));
-    }
-    let mut causes = Vec::new();
+    let what = format!("{to:?} {fault_is:?}");
+    // Where it ends as it has begun something comes in between.
+    let begun = if end == GroupState::Standby { 20 } else { 0 };
+    client.listen(Time::from_ms(begun));
+    until(&mut client, end);
+    let watched = if cause.is_some() { 200 } else { 1800 };
+    client.listen(Time::from_ms(watched));
+    assert_eq!(state(&mut client), end as u32, "{what}");
     for axis in 1..=AXES {
-        causes.push(fault(&mut client, axis));
+        let (told, _) = fault(&mut client, axis);
+        let expected = cause
+            .filter(|_| axis == AXIS)
+            .map_or(0, |cause| cause as u32);
+        assert_eq!(told, expected, "{what}: axis {axis}");
     }
-    seen.push(format!("{causes:X?} rpm {}", fastest(&client.world)));
-    let (cause, _) = causes[usize::from(AXIS) - 1];
+    for (axis, (truth, status)) in (1..).zip(both(&client)) {
+        let wild = gone_wild && axis == AXIS;
+        let rpm = truth.velocity_rpm.abs();
+        assert!(
+            rpm <= STANDSTILL_RPM || wild,
+            "{what}: axis {axis}: {rpm} rpm"
+        );
+        let off = matches!(end, GroupState::Idle | GroupState::Faulted);
+        let hears = cause.is_none() || axis != AXIS;
+        assert!(!(hears && off && enabled(&status)), "{what}: axis {axis}");
+    }
     let record = client.world.finish();
-    for axis in &record.axes {
-        if axis.motion.unreleased().is_some() { seen.push(format!("unreleased {:?}", axis.motion.unreleased())); }
+    for (n, axis) in record.axes.iter().enumerate() {
+        let free = gone_wild && n + 1 == usize::from(AXIS);
+        assert!(
+            free || axis.motion.unreleased().is_none(),
+            "{what}: axis {}",
+            n + 1
+        );
     }
-    for (at, line) in &record.log {
-        if at > &begun && line.level >= Some(canmaster_sim::log::Level::Warn) { seen.push(format!("{at} {line}")); }
-    }
-    (last, cause, seen)
+    let named = format!("axis {AXIS}");
+    let said = |line: &LogLine| line.level == Some(Level::Error) && line.message.contains(&named);
+    let named = record.log.iter().any(|(_, line)| said(line));
+    assert_eq!(named, cause.is_some(), "{what}");
+}
+
+fn both(client: &Client<'_>) -> Vec<(PlantState, DriveStatus)> {
+    let truths = client.world.truths().flatten();
+    truths.zip(client.world.statuses().flatten()).collect()
 }
 
 const DEAF: DriveFault = DriveFault::InState {
@@ -168,41 +194,120 @@ const fn in_state(state: State, what: Trouble) -> DriveFault {
     DriveFault::InState { state, what }
 }
 
+/// As soon as it is asked for.
+const NOW: Time = Time::ZERO;
+
 #[test]
-fn explore() {
-    let now = Time::ZERO;
-    let cases = [
-        (In::Enabling, in_state(State::SwitchedOn, Trouble::Deaf)),
-        (In::Enabling, late(State::SwitchedOn, 300)),
-        (In::Enabling, in_state(State::SwitchedOn, Trouble::DropsOut { after_us: 1500 })),
-        (In::Enabling, DriveFault::PowerLoss { at: now }),
-        (In::Standby, DROPS_OUT),
-        (In::Moving, DROPS_OUT),
-        (In::Moving, DriveFault::Blocked { at: now, until: None }),
-        (In::Stopping, DROPS_OUT),
-        (In::Stopping, DriveFault::Blocked { at: now, until: None }),
-        (In::SetPointStop, DEAF),
-        (In::Halt, DROPS_OUT),
-        (In::Homing, DEAF),
-        (In::Homing, DROPS_OUT),
-        (In::Homing, DriveFault::PowerLoss { at: now }),
-        (In::ModeChange, DriveFault::ModeStuck { at: now }),
-        (In::ModeChange, DriveFault::SdoDead { at: now }),
-        (In::ModeChange, DriveFault::SdoLatency(Spread::fixed(60_000))),
-        (In::ModeChange, DROPS_OUT),
-        (In::ModeChange, DriveFault::PowerLoss { at: now }),
-        (In::QuickStop, DEAF),
-        (In::QuickStop, DROPS_OUT),
-        (In::QuickStop, DriveFault::PowerLoss { at: now }),
-        (In::Disabling, DEAF),
-        (In::Disabling, late(State::OperationEnabled, 300)),
-        (In::Disabling, DROPS_OUT),
-        (In::SetPoint, DEAF),
-        (In::SetPoint, late(State::OperationEnabled, 100)),
-    ];
-    for (n, (to, fault)) in (100..).zip(cases) {
-        let (state, cause, seen) = struck(n, to, fault);
-        println!("== {to:?} {fault:?}: {state} {cause}\n{}", seen.join("\n"));
+fn one_that_never_confirms_ends_in_faulted() {
+    let deaf = in_state(State::SwitchedOn, Trouble::Deaf);
+    for (seed, to, fault, cause) in [
+        (101, In::Enabling, deaf, Cause::NotEnabled),
+        (102, In::SetPoint, DEAF, Cause::NotDone),
+        (103, In::SetPointStop, DEAF, Cause::NotArrived),
+        (104, In::Homing, DEAF, Cause::NotDone),
+        (
+            105,
+            In::ModeChange,
+            DriveFault::ModeStuck { at: NOW },
+            Cause::ModeNotConfirmed,
+        ),
+        (
+            106,
+            In::ModeChange,
+            DriveFault::SdoDead { at: NOW },
+            Cause::ModeNotConfirmed,
+        ),
+        // It comes to rest, but is never seen to be off.
+        (
+            107,
+            In::QuickStop,
+            in_state(State::QuickStopActive, Trouble::Deaf),
+            Cause::NotEnabled,
+        ),
+        (108, In::Disabling, DEAF, Cause::NotEnabled),
+    ] {
+        ends(seed, to, fault, GroupState::Faulted, Some(cause));
     }
-    let _ = STANDSTILL_RPM;
+}
+
+#[test]
+fn one_that_does_not_follow_ends_in_faulted() {
+    let blocked = DriveFault::Blocked {
+        at: NOW,
+        until: None,
+    };
+    for (seed, to) in [(111, In::Moving), (112, In::Stopping)] {
+        let cause = Some(Cause::FollowingError);
+        ends(seed, to, blocked, GroupState::Faulted, cause);
+    }
+}
+
+#[test]
+fn one_that_confirms_late_is_waited_for() {
+    let slow = DriveFault::SdoLatency(Spread::fixed(60_000));
+    for (seed, to, fault, end) in [
+        (
+            121,
+            In::Enabling,
+            late(State::SwitchedOn, 300),
+            GroupState::Standby,
+        ),
+        (
+            122,
+            In::SetPoint,
+            late(State::OperationEnabled, 100),
+            GroupState::Moving,
+        ),
+        (123, In::ModeChange, slow, GroupState::Standby),
+        (
+            124,
+            In::QuickStop,
+            late(State::QuickStopActive, 100),
+            GroupState::Idle,
+        ),
+        (
+            125,
+            In::Disabling,
+            late(State::OperationEnabled, 300),
+            GroupState::Idle,
+        ),
+    ] {
+        ends(seed, to, fault, end, None);
+    }
+}
+
+#[test]
+fn one_that_drops_out_ends_in_faulted() {
+    let too_early = in_state(State::SwitchedOn, Trouble::DropsOut { after_us: 1500 });
+    for (seed, to, fault, cause) in [
+        (131, In::Enabling, too_early, Cause::NotEnabled),
+        (132, In::Standby, DROPS_OUT, Cause::LeftEnabled),
+        (133, In::Moving, DROPS_OUT, Cause::LeftEnabled),
+        (134, In::Stopping, DROPS_OUT, Cause::LeftEnabled),
+        (135, In::Halt, DROPS_OUT, Cause::LeftEnabled),
+        (136, In::Homing, DROPS_OUT, Cause::LeftEnabled),
+        (137, In::ModeChange, DROPS_OUT, Cause::LeftEnabled),
+        (138, In::SetPoint, DROPS_OUT, Cause::LeftEnabled),
+    ] {
+        ends(seed, to, fault, GroupState::Faulted, Some(cause));
+    }
+    // It was to be disabled in the end.
+    ends(139, In::QuickStop, DROPS_OUT, GroupState::Idle, None);
+}
+
+#[test]
+fn one_that_is_gone_ends_in_faulted() {
+    let lost = DriveFault::PowerLoss { at: NOW };
+    for (seed, to) in [
+        (141, In::Enabling),
+        (142, In::Stopping),
+        (143, In::Halt),
+        (144, In::Homing),
+        (145, In::ModeChange),
+        (146, In::QuickStop),
+        (147, In::Disabling),
+    ] {
+        let cause = Some(Cause::TpdoMissing);
+        ends(seed, to, lost, GroupState::Faulted, cause);
+    }
 }
