@@ -72,7 +72,7 @@ fn use_methods(client: &mut Client<'_>, methods: [i8; AXES as usize]) {
 }
 
 #[test]
-fn every_method_finds_its_zero() {
+fn the_board_finds_home_by_every_method() {
     let mut client = searching(81, with_switches);
     for (methods, zeros) in [
         // The hard stops, and the index off them; where it is; the home switch.
@@ -84,6 +84,11 @@ fn every_method_finds_its_zero() {
         (
             [1, 2, 11, 17, 18, 23],
             [-3300.0, 4700.0, 2700.0, -5000.0, 5000.0, -1000.0],
+        ),
+        // The other edge of the home switch, the next index; the others stay.
+        (
+            [27, 33, 34, 37, 37, 37],
+            [1500.0, 2700.0, 4700.0, -5000.0, 5000.0, -1000.0],
         ),
     ] {
         use_methods(&mut client, methods);
@@ -190,7 +195,7 @@ fn a_homing_error_names_the_axis_and_can_be_tried_again() {
 
 /// Only the axes of 2003h search.
 #[test]
-fn the_others_keep_still() {
+fn who_is_not_asked_to_search_keeps_still() {
     let mut client = searching(87, with_switches);
     use_methods(&mut client, [37, 23, 37, 37, 37, 37]);
     let before = positions(&mut client);

@@ -97,7 +97,8 @@ fn lead(client: &mut Client<'_>, to: In, fault: DriveFault) {
             if to == In::SetPointStop {
                 set_modes(client, ALL, Mode::ProfilePosition as u8);
             }
-            put_targets(client, 60_000);
+            // So far that none arrives.
+            put_targets(client, 400_000);
             start(client);
             client.listen(Time::from_ms(600));
             if to == In::SetPointStop {
@@ -124,8 +125,8 @@ fn lead(client: &mut Client<'_>, to: In, fault: DriveFault) {
 /// It ends like this, with that cause in 200Eh of the axis; of the others with none.
 /// All of them are at rest then, or all but the one that obeys no more.
 fn ends(seed: u64, to: In, fault_is: DriveFault, end: GroupState, cause: Option<Cause>) {
-    // It hears nothing and goes on with its search; it has no supply and coasts.
-    let deaf = (to, fault_is) == (In::Homing, DEAF);
+    // It hears nothing and goes on by itself; it has no supply and coasts.
+    let deaf = fault_is == DEAF && matches!(to, In::Homing | In::SetPointStop);
     let gone_wild = deaf || cause == Some(Cause::TpdoMissing);
     let scenario = Scenario::new(seed, END).tuned(endless);
     let mut client = ready(scenario);
@@ -169,6 +170,10 @@ fn ends(seed: u64, to: In, fault_is: DriveFault, end: GroupState, cause: Option<
     let said = |line: &LogLine| line.level == Some(Level::Error) && line.message.contains(&named);
     let named = record.log.iter().any(|(_, line)| said(line));
     assert_eq!(named, cause.is_some(), "{what}");
+    let turns = format!("axis {AXIS}: not seen at rest");
+    let told = |line: &LogLine| line.message.contains(&turns);
+    let told = record.log.iter().any(|(_, line)| told(line));
+    assert_eq!(told, deaf, "{what}");
 }
 
 fn both(client: &Client<'_>) -> Vec<(PlantState, DriveStatus)> {
@@ -198,7 +203,7 @@ const fn in_state(state: State, what: Trouble) -> DriveFault {
 const NOW: Time = Time::ZERO;
 
 #[test]
-fn one_that_never_confirms_ends_in_faulted() {
+fn a_drive_that_never_confirms_ends_every_state_in_faulted() {
     let deaf = in_state(State::SwitchedOn, Trouble::Deaf);
     for (seed, to, fault, cause) in [
         (101, In::Enabling, deaf, Cause::NotEnabled),
@@ -231,7 +236,7 @@ fn one_that_never_confirms_ends_in_faulted() {
 }
 
 #[test]
-fn one_that_does_not_follow_ends_in_faulted() {
+fn a_drive_that_does_not_follow_ends_in_faulted() {
     let blocked = DriveFault::Blocked {
         at: NOW,
         until: None,
@@ -243,7 +248,7 @@ fn one_that_does_not_follow_ends_in_faulted() {
 }
 
 #[test]
-fn one_that_confirms_late_is_waited_for() {
+fn a_drive_that_confirms_late_is_waited_for_in_every_state() {
     let slow = DriveFault::SdoLatency(Spread::fixed(60_000));
     for (seed, to, fault, end) in [
         (
@@ -277,7 +282,7 @@ fn one_that_confirms_late_is_waited_for() {
 }
 
 #[test]
-fn one_that_drops_out_ends_in_faulted() {
+fn a_drive_that_drops_out_ends_every_state_in_faulted() {
     let too_early = in_state(State::SwitchedOn, Trouble::DropsOut { after_us: 1500 });
     for (seed, to, fault, cause) in [
         (131, In::Enabling, too_early, Cause::NotEnabled),
@@ -296,7 +301,7 @@ fn one_that_drops_out_ends_in_faulted() {
 }
 
 #[test]
-fn one_that_is_gone_ends_in_faulted() {
+fn a_drive_without_supply_ends_every_state_in_faulted() {
     let lost = DriveFault::PowerLoss { at: NOW };
     for (seed, to) in [
         (141, In::Enabling),
