@@ -124,6 +124,33 @@ fn axes_have_an_encoder_and_profile_velocity_mode() {
     );
 }
 
+/// The unit of speeds, 60A9h, as a start value of the device and of a node.
+#[test]
+fn another_unit_of_speeds_is_refused() {
+    let device = "[[device.epos4.start_values]]";
+    assert!(sample().contains(device));
+    let tenths = format!("{device}\nobject = \"60A9\"\nvalue = 0xFFB44700\n\n{device}");
+    let refusal = "the firmware has speeds in rpm: 60A9h:00 of \"axis 1\" has to be 00B44700h";
+    says(
+        device,
+        &tenths,
+        &["`FFB44700h`", refusal, "write 0x00B44700"],
+    );
+    let rpm = tenths.replace("FFB4", "00B4");
+    assert_eq!(words(&sample().replacen(device, &rpm, 1)), "");
+    // The node goes before its device, and is named with its line.
+    let own = "start_values = [{ object = \"60A9\", value = 0xFEB44700 }]";
+    let name = "name = \"axis 2\"";
+    let text = sample().replacen(name, &format!("{name}\n{own}"), 1);
+    let line = text.lines().position(|line| line == own).unwrap() + 1;
+    let words = words(&text);
+    assert!(
+        words.contains("`FEB44700h`") && words.contains("\"axis 2\""),
+        "{words}"
+    );
+    assert!(words.contains(&format!("network.toml:{line}:")), "{words}");
+}
+
 #[test]
 fn numbers_that_no_axis_can_be_led_with() {
     for (from, to, value, help) in [

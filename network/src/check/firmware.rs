@@ -25,6 +25,12 @@ const SPEED_MIN: u32 = 60;
 const ACCELERATION_MIN: u32 = 100;
 const MODES_OF_OPERATION: Address = Address::new(0x6060, 0);
 
+/// The units of what it sends and is told, and what stands for them in the drive.
+const UNITS: [(Address, u32, &str); 2] = [
+    (Address::new(0x60A9, 0), 0x00B4_4700, "speeds in rpm"),
+    (Address::new(0x60AA, 0), 0x00C0_0300, "ramps in rpm/s"),
+];
+
 /// An object, its bits, its name.
 type Wanted = (Address, u8, &'static str);
 
@@ -97,6 +103,7 @@ fn motor(description: &Description, node: &Node, described: &Described, context:
         );
     }
     numbers(description, node, described, context);
+    units(description, node, described, context);
     let mut modes = node
         .start_values
         .iter()
@@ -113,6 +120,34 @@ fn motor(description: &Description, node: &Node, described: &Described, context:
             mode.unwrap_or(&described.device).get_ref(),
             "the firmware leads its axes in profile velocity mode",
             "write mode = \"profile velocity\" in the axis",
+        );
+    }
+}
+
+/// A drive with another unit would turn at another speed than it is told.
+fn units(description: &Description, node: &Node, described: &Described, context: &mut Context<'_>) {
+    for (at, wanted, what) in UNITS {
+        let mut writes = node.start_values.iter();
+        let Some(write) = writes.rfind(|write| write.at == at && write.value != wanted) else {
+            continue;
+        };
+        let of_device = device(description, described);
+        let of_device = of_device.map_or(&[][..], |device| &device.start_values);
+        let mut given = described.start_values.iter().chain(of_device);
+        let place = given
+            .find(|start| u32::try_from(*start.value.get_ref()) == Ok(write.value))
+            .map_or_else(
+                || context.at(&described.device),
+                |start| context.at(&start.value),
+            );
+        context.problems.error(
+            &place,
+            format!("{:08X}h", write.value),
+            format!(
+                "the firmware has {what}: {at} of \"{}\" has to be {wanted:08X}h",
+                node.name
+            ),
+            format!("write 0x{wanted:08X}, or leave it out"),
         );
     }
 }
