@@ -33,6 +33,16 @@ pub struct AxisConfig {
 }
 
 impl AxisConfig {
+    /// Whether it can be told to go to a target from home, or to a torque.
+    #[inline(never)]
+    pub(in crate::motion) fn takes(&self, target: i32, torque: bool, why: &mut Refusal) -> Judged {
+        if torque {
+            let value = target.unsigned_abs().max(1);
+            return why.within(Reason::Torque, value, self.torque_max.into());
+        }
+        self.reaches(target, why)
+    }
+
     /// Whether a target, counted from home, lies within the travel; if not, the end
     /// that is passed.
     #[inline(never)]

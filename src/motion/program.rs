@@ -22,6 +22,10 @@ pub struct AxisMove {
     pub set: u8,
 }
 
+/// In the set of a program's move: its target is a torque, and per mille stand where
+/// else there are rpm.
+pub(super) const TORQUE: u8 = 1 << 7;
+
 /// Why something is refused: the number that stands in 2002h.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
@@ -241,10 +245,14 @@ impl AxisMove {
         ]
     }
 
-    /// Checks all but the target against the limits of its axis.
-    pub(super) fn keeps(&self, limits: &AxisConfig, why: &mut Refusal) -> Judged {
-        let most = limits.acceleration_max;
-        why.within(Reason::Velocity, self.velocity, limits.velocity_max)?;
+    /// Checks all but the target against the limits of its axis; how fast a torque
+    /// changes has none.
+    pub(super) fn keeps(&self, torque: bool, limits: &AxisConfig, why: &mut Refusal) -> Judged {
+        let (mut fastest, mut most) = (limits.velocity_max, limits.acceleration_max);
+        if torque {
+            (fastest, most) = (u32::MAX, u32::MAX);
+        }
+        why.within(Reason::Velocity, self.velocity, fastest)?;
         why.within(Reason::Acceleration, self.acceleration, most)?;
         why.within(Reason::Deceleration, self.deceleration, most)
     }

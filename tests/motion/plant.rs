@@ -67,6 +67,8 @@ pub(crate) struct Drive {
     over: f64,
     /// Where a move of the drive itself goes; `None`: there is none.
     going: Option<f64>,
+    /// The last set-point.
+    aimed: i64,
     /// Bit 12 in modes that the drive leads.
     answered: bool,
     /// It never answers set-points, and does not find its home.
@@ -105,6 +107,7 @@ impl Drive {
             last: 0.0,
             over: 0.0,
             going: None,
+            aimed: 0,
             answered: false,
             deaf: false,
             homeless: false,
@@ -164,6 +167,7 @@ impl Drive {
     /// Set-point handshake, and homing on the actual position (method 37).
     fn lead(&mut self, before: ControlWord) {
         const BEGIN: u16 = 1 << 4;
+        const RELATIVE: u16 = 1 << 6;
         let begin = self.word.0 & BEGIN != 0;
         if self.deaf || self.state != State::OperationEnabled {
             return;
@@ -175,7 +179,12 @@ impl Drive {
             self.answered = begin && !self.homeless;
         } else {
             if begin && before.0 & BEGIN == 0 {
-                self.going = Some(f64::from(self.target.target));
+                // From the target before, or to a position.
+                if self.word.0 & RELATIVE == 0 {
+                    self.aimed = 0;
+                }
+                self.aimed += i64::from(self.target.target);
+                self.going = Some(self.aimed as f64);
             }
             self.answered = begin;
         }

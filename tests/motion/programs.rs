@@ -250,6 +250,89 @@ fn what_a_drive_leads_is_finished_unless_it_was_waited_for() {
     assert_eq!(of(&[out, modes(10), back]), [true, true]);
 }
 
+/// A distance is told to a drive in profile position mode as such (bit 6); it counts
+/// from the set-point before, whatever was stopped in between.
+#[test]
+fn a_distance_is_told_to_the_drive() {
+    const RELATIVE: u16 = 1 << 6;
+    let by = |flags: u8, way| go(1 | flags, &[(0, way, 600, 2000)]);
+    let mut rig = Rig::in_mode(1, Mode::ProfilePosition);
+    rig.program = program(&[by(0, 40_000)]);
+    rig.run();
+    for _ in 0..100 {
+        rig.step(READY);
+    }
+    rig.order(canmaster::motion::Order::Stop);
+    rig.until(GroupState::Standby, 300);
+    let from = rig.drives[0].position;
+    rig.program = program(&[by(0, 3000), by(0, -1000), go(0, &[(1, 700, 600, 2000)])]);
+    rig.run();
+    let (mut told, mut before) = (Vec::new(), u16::MAX);
+    while !rig.notices.contains(&GroupEvent::ProgramDone) {
+        rig.step(READY);
+        let command = rig.commands[0];
+        let moving = rig.group.state() == GroupState::Moving;
+        if moving && command.controlword & !before & 1 << 4 != 0 {
+            told.push((command.controlword & RELATIVE != 0, command.target));
+        }
+        before = command.controlword;
+        assert!(rig.cycle < 4000, "{}", rig.last());
+    }
+    assert_eq!(told, [(true, 3000), (true, -1000)]);
+    assert!((rig.drives[0].position - from - 2000.0).abs() < 3.0);
+    let end = rig.group.view(0).unwrap().end;
+    assert!((rig.drives[0].position - f64::from(end)).abs() < 3.0);
+    // In standby the target is where the axis is.
+    assert_eq!(rig.commands[0].target, end);
+}
+
+/// In torque mode a move has the limits of torques, elsewhere those of positions; where
+/// the axis is in another mode than its step is made for, nothing of it is done.
+#[test]
+fn a_torque_is_no_position() {
+    let torque = |target, rate: u32| {
+        let mut step = go(0, &[(0, target, 0, 1)]);
+        step[12..16].copy_from_slice(&(rate | 1 << 31).to_le_bytes());
+        step
+    };
+    let mut tight = GROUP;
+    tight.axes[0].travel = (-10, 10);
+    let check = |step| format::check(&program(&[step]), &tight);
+    assert_eq!(check(torque(-600, 5000)), Ok(()));
+    let why = check(torque(1001, 5000)).unwrap_err();
+    let found = (why.reason, why.step, why.value, why.allowed);
+    assert_eq!(found, (Reason::Torque, 1, 1001, 1000));
+    let why = check(go(0, &[(0, 600, 100, 1)])).unwrap_err();
+    assert_eq!(why.reason, Reason::Target);
+    for (step, mode) in [
+        (torque(60, 5000), Mode::ProfileVelocity),
+        (go(0, &[(0, 60, 100, 1000)]), Mode::CyclicTorque),
+    ] {
+        let mut rig = Rig::in_mode(1, mode);
+        rig.program = program(&[step]);
+        rig.run();
+        rig.until(GroupState::Standby, 300);
+        let failed = rig.notices.iter().find_map(|notice| match notice {
+            GroupEvent::ProgramFailed(why) => Some((why.reason, why.axis, why.step)),
+            _ => None,
+        });
+        assert_eq!(failed, Some((Reason::WrongMode, 0, 1)));
+    }
+}
+
+/// The compiler says which moves are of torques.
+#[test]
+fn a_torque_of_a_program_is_marked() {
+    let text = "velocity = 3000\nacceleration = 20_000\n[[step]]\n[step.mode]\n\
+        axes = [\"axis 1\"]\nis = \"cyclic synchronous torque\"\n[[step]]\nsettle = false\n\
+        [[step.move]]\naxes = [\"axis 1\"]\nto = 50\nvelocity = 9000\n\
+        acceleration = 900_000\n[[step.move]]\naxes = [\"axis 2\"]\nto = 500\n\
+        [[step]]\nwait_ms = 100\n[[step]]\n[[step.move]]\naxes = [\"axis 1\"]\nto = 0";
+    let rig = run(compiled(text).bytes(), 2000);
+    let at = rig.drives[1].position - homes(&rig)[1];
+    assert!((at - 500.0).abs() <= 3.0, "{at}");
+}
+
 /// Homing and modes inside of a program: one release counts for all of it.
 #[test]
 fn home_then_move_in_another_mode() {

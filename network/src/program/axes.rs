@@ -43,6 +43,9 @@ const TRAVEL_MAX: i64 = (1 << 30) - 1;
 /// A program cannot ask for more torque, per mille of the rated one.
 pub(super) const TORQUE_MAX: i64 = 1000;
 
+/// In the set of a move: its target is a torque.
+pub(super) const TORQUE: u8 = 1 << 7;
+
 /// 6060h
 const MODES_OF_OPERATION: Address = Address::new(0x6060, 0);
 /// Modes of operation by their numbers.

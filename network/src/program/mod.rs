@@ -120,7 +120,8 @@ pub struct Part {
     pub acceleration: u32,
     /// rpm/s
     pub deceleration: u32,
-    /// Axes with the same number arrive together.
+    /// Axes with the same number arrive together; with bit 7 the target is a torque, and
+    /// the others are per mille a second, and a second squared.
     pub set: u8,
 }
 

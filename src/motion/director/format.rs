@@ -3,7 +3,7 @@
 use crate::motion::fixed;
 use crate::motion::mode::Mode;
 use crate::motion::path::Knot;
-use crate::motion::program::{AxisMove, Judged, Reason, Refusal, Refused};
+use crate::motion::program::{AxisMove, Judged, Reason, Refusal, Refused, TORQUE};
 use crate::motion::{AxisConfig, GroupConfig, next};
 use crate::sdo::Crc16;
 
@@ -339,9 +339,10 @@ fn check_step<const N: usize>(
         match step.kind {
             MOVE => {
                 let part = step.part(member);
-                part.keeps(limits, why)?;
+                let torque = part.set & TORQUE != 0;
+                part.keeps(torque, limits, why)?;
                 if absolute {
-                    limits.reaches(part.target, why)?;
+                    limits.takes(part.target, torque, why)?;
                 }
             }
             PATH => {

@@ -4,7 +4,7 @@ use super::format::{RELATIVE, Step};
 use super::{Director, LATER_MAX, LEAD, Phase, format};
 use crate::motion::group::{Group, SetPoint};
 use crate::motion::mode::Mode;
-use crate::motion::program::{AxisMove, Judged, Reason, Refusal, Refused};
+use crate::motion::program::{AxisMove, Judged, Reason, Refusal, Refused, TORQUE};
 use crate::motion::{fixed, next, plan};
 
 /// Points of a path that are handed over in one look, since the group waits.
@@ -51,6 +51,11 @@ impl<const N: usize> Director<N> {
         *why = Refusal::NONE;
         why.axis = axis as u8;
         let torque = of.mode() == Mode::CyclicTorque;
+        if self.running && torque != (part.set & TORQUE != 0) {
+            // The numbers of the program mean something else in this mode.
+            let (mode, allowed) = (of.mode() as u32, Mode::CyclicTorque as u32);
+            return why.because(Reason::WrongMode, mode, allowed);
+        }
         let (home, scale) = if torque {
             (0, limits.scale.of_units())
         } else {
@@ -61,13 +66,8 @@ impl<const N: usize> Director<N> {
             let end = fixed::round(of.path.end());
             target = target.saturating_add(end.wrapping_sub(home));
         }
-        part.keeps(limits, why)?;
-        if torque {
-            let value = target.unsigned_abs().max(1);
-            why.within(Reason::Torque, value, limits.torque_max.into())?;
-        } else {
-            limits.reaches(target, why)?;
-        }
+        part.keeps(torque, limits, why)?;
+        limits.takes(target, torque, why)?;
         leg.set = Some(part.set);
         leg.target = target.wrapping_add(home);
         [leg.velocity, leg.acceleration, leg.deceleration] = part.limits(scale);
@@ -185,7 +185,7 @@ impl<const N: usize> Director<N> {
                 let set_point = SetPoint {
                     target: leg.target,
                     immediately: !self.after,
-                    relative: false,
+                    relative: self.running && step.has(RELATIVE),
                     after,
                 };
                 // It can take one, as the prediction has found.

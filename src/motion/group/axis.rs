@@ -292,9 +292,11 @@ impl Axis {
             _ if self.feedback.fresh || changes => self.feedback.position,
             _ => fixed::round(self.sample(END).position),
         };
+        let holds = self.mode() == Mode::ProfilePosition;
+        // From what it holds already the next one may count.
+        let position = self.led.held().filter(|_| holds).unwrap_or(position);
         self.samples = [Sample::at_rest(position); RING];
         self.end_at(position);
-        let holds = self.mode() == Mode::ProfilePosition;
         self.led.rest(holds.then_some(position));
     }
 
@@ -334,6 +336,7 @@ impl Axis {
         self.over = 0;
         if self.seen & BY_DRIVE != 0 || self.wanted.is_some() {
             // Its path stands where it is.
+            self.led.stop();
             return 0.0;
         }
         let position = self.sample(NEXT).position;
@@ -404,8 +407,14 @@ impl Axis {
             && ControlWord(word).gives(Command::EnableOperation);
         self.target = match mode {
             Mode::ProfilePosition | Mode::Homing if led => {
-                out.controlword |= self.led.bits(lead == Lead::Halt);
-                self.led.target
+                let halt = lead == Lead::Halt;
+                let (begun, target) = match self.led.begun() {
+                    Some(begun) => begun,
+                    None if mode == Mode::Homing => (0, 0),
+                    None => (0, end),
+                };
+                out.controlword = ControlWord(word | begun).with_halt(halt).0;
+                target
             }
             Mode::CyclicPosition | Mode::ProfilePosition => end,
             _ if rests => 0,

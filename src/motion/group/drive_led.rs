@@ -1,7 +1,7 @@
 //! Motion that the drive makes by itself: the set-point handshake of profile
 //! position mode (CiA 402-2, 10.3) and homing (11.3).
 
-use crate::cia402::{ControlWord, StatusWord};
+use crate::cia402::StatusWord;
 use crate::motion::mode::Mode;
 
 /// Bit 4 of the controlword: new set-point, or begin homing.
@@ -18,11 +18,11 @@ const SEEN_AFTER: u8 = 2;
 /// How a set-point is meant.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SetPoint {
-    /// 607Ah, increments.
+    /// Where it ends, increments.
     pub target: i32,
     /// It replaces the running one at once; else the drive finishes that first.
     pub immediately: bool,
-    /// It counts from the set-point before.
+    /// The drive is told the way from the set-point before (bit 6).
     pub relative: bool,
     /// Cycles that it waits: it is handed over with the first set value of a path that
     /// begins so many steps later.
@@ -101,20 +101,25 @@ impl DriveLed {
         };
     }
 
+    /// What was asked is halted: none of it counts any more.
+    pub(super) fn stop(&mut self) {
+        self.phase = Phase::Done;
+    }
+
+    /// The position that the drive was told to hold, until it was told something else.
+    pub(super) fn held(&self) -> Option<i32> {
+        (self.phase == Phase::Set).then_some(self.target)
+    }
+
     /// Homing, to end within `limit` cycles.
     pub(super) fn home(&mut self, limit: u32) {
         self.ask(&SetPoint::default());
         self.limit = limit;
     }
 
-    /// Bits 4 to 6 and 8 of the controlword. Halt takes the others back, so that what
-    /// follows it begins with an edge.
-    pub(super) fn bits(&self, halt: bool) -> u16 {
-        let begun = match self.phase {
-            Phase::Set if !halt => BEGIN | self.flags,
-            _ => 0,
-        };
-        ControlWord(begun).with_halt(halt).0
+    /// Bits 4 to 6 of the controlword, and the target that belongs to them.
+    pub(super) fn begun(&self) -> Option<(u16, i32)> {
+        (self.phase == Phase::Set).then_some((BEGIN | self.flags, self.target))
     }
 
     /// Takes in a statusword, if a fresh one came, `passed` cycles later. `false`: it reports that homing

@@ -318,6 +318,9 @@ impl<const N: usize> Group<N> {
         let can = takes && axis.mode() == Mode::ProfilePosition && axis.led.is_taken();
         if can {
             axis.led.ask(set_point);
+            if set_point.relative {
+                axis.led.target = axis.led.target.wrapping_sub(axis.head());
+            }
             // What comes next counts from there.
             axis.end_at(set_point.target);
             self.busy |= bit;

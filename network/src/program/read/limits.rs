@@ -5,8 +5,11 @@ use toml::Spanned;
 use super::Reader;
 use crate::problem::Place;
 use crate::program::Path;
-use crate::program::axes::TORQUE_MAX;
+use crate::program::axes::{CYCLIC_TORQUE, TORQUE_MAX};
 use crate::program::description::Values;
+
+/// As fast as a torque may change, per mille/s: what there is room for.
+const RATE_MAX: u32 = (1 << 24) - 1;
 
 /// What single precision may make of a limit in the firmware, relative.
 const ROUNDING: f64 = 1.0 + 1e-4;
@@ -32,8 +35,11 @@ impl Reader<'_> {
         let place = self.context.at(values);
         let mut out = Vec::new();
         for (axis, value) in members.iter().zip(all) {
+            let torque = self.is_torque(*axis);
             let axis = self.group.axes.get(*axis)?;
             let (most, unit, from) = match key {
+                "velocity" if torque => (RATE_MAX, "per mille/s", "format"),
+                _ if torque => (u32::MAX, "per mille/s^2", "format"),
                 "velocity" => (axis.velocity_max, "rpm", "max_speed"),
                 _ => (axis.acceleration_max, "rpm/s", "max_acceleration"),
             };
@@ -100,6 +106,12 @@ impl Reader<'_> {
         let help = format!("the nearest that is allowed is {nearest}");
         self.error(place, shown, rule, &help);
         None
+    }
+
+    /// Whether an axis is known to be moved by torques here.
+    pub(super) fn is_torque(&self, axis: usize) -> bool {
+        let known = self.known.get(axis);
+        known.is_some_and(|known| known.mode == Some(CYCLIC_TORQUE))
     }
 
     /// A torque in per mille of the rated one.

@@ -4,7 +4,7 @@ use toml::Spanned;
 
 use super::Reader;
 use crate::problem::Place;
-use crate::program::axes::CYCLIC_TORQUE;
+use crate::program::axes::TORQUE;
 use crate::program::description;
 use crate::program::{Move, Part};
 
@@ -94,10 +94,10 @@ impl Reader<'_> {
                 return None;
             }
             let value = *numbers.get(member)?;
-            let target = if self.known.get(axis)?.mode == Some(CYCLIC_TORQUE) {
-                self.torque(axis, value, &where_to)?
+            let (target, mark) = if self.is_torque(axis) {
+                (self.torque(axis, value, &where_to)?, TORQUE)
             } else {
-                self.target(axis, value, out.relative, &where_to)?
+                (self.target(axis, value, out.relative, &where_to)?, 0)
             };
             out.parts.push(Part {
                 axis,
@@ -105,7 +105,7 @@ impl Reader<'_> {
                 velocity: *velocity.get(member)?,
                 acceleration: *up.get(member)?,
                 deceleration: *down.get(member)?,
-                set,
+                set: set | mark,
             });
         }
         Some(())
