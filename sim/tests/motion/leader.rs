@@ -141,9 +141,11 @@ pub(crate) fn set_modes(client: &mut Client<'_>, axes: u32, mode: u8) {
     }
 }
 
-/// Has the axes that were chosen search for their homes.
+/// Releases the group and has the axes that were chosen search for their homes.
 #[track_caller]
 pub(crate) fn home(client: &mut Client<'_>) {
+    command(client, RELEASE).unwrap();
+    until(client, GroupState::Moving);
     command(client, HOME).unwrap();
     until(client, GroupState::Homing);
 }
