@@ -253,7 +253,7 @@ impl Phases {
         let (mut low, mut high) = (at_least, at_least);
         while !self.fit(legs, set, high) {
             low = high + 1;
-            high = 2 * low;
+            high = CYCLES_MAX.min(2 * low);
             if low > CYCLES_MAX {
                 return None;
             }
