@@ -185,6 +185,35 @@ fn a_released_group_runs_its_program() {
     arrived(&mut client, &from, 0);
 }
 
+/// Refused with axis, reason and value as soon as it is started; nothing moves.
+#[test]
+fn a_move_beyond_a_limit_is_refused() {
+    const FARTHEST: u32 = 1 << 30;
+    let mut client = in_standby(68);
+    let from = positions(&mut client);
+    command(&mut client, RELEASE).unwrap();
+    until(&mut client, GroupState::Moving);
+    for (axis, index, value, reason) in [
+        (2, panel::VELOCITY, 3001, 28),
+        (3, panel::ACCELERATION, 20_001, 29),
+        (5, panel::TARGET, FARTHEST, 31),
+        (6, panel::TARGET, FARTHEST.wrapping_neg(), 31),
+    ] {
+        put_targets(&mut client, 6000);
+        client.put(index, axis, value, 4).unwrap();
+        let done = command(&mut client, START);
+        let why = u32::from(axis) << 24 | reason << 16 | value & 0xFFFF;
+        refused(&mut client, done, AbortCode::VALUE_RANGE, why);
+    }
+    client.listen(Time::from_ms(300));
+    arrived(&mut client, &from, 0);
+    // What is within its limits is made.
+    put_targets(&mut client, 6000);
+    command(&mut client, START).unwrap();
+    client.listen(Time::from_ms(1500));
+    arrived(&mut client, &from, 6000);
+}
+
 /// With jerk `j` the acceleration `a` takes `a / j` to build up: until then the way is
 /// `j t^3 / 6` instead of `a t^2 / 2`, and the move lasts so much longer.
 #[test]
