@@ -15,7 +15,7 @@ use canmaster_sim::world::{Client, Scenario, World, enabled};
 use crate::common::image;
 
 const MASTER: NodeId = NodeId::constant::<127>();
-pub(crate) const END: Time = Time::from_ms(60_000);
+pub(crate) const END: Time = Time::from_ms(90_000);
 pub(crate) const AXES: u8 = 6;
 /// For 2003h.
 pub(crate) const ALL: u32 = (1 << AXES) - 1;
@@ -66,11 +66,11 @@ pub(crate) fn state(client: &mut Client<'_>) -> u32 {
 
 #[track_caller]
 pub(crate) fn until(client: &mut Client<'_>, wanted: GroupState) {
-    for _ in 0..1000 {
+    for _ in 0..4000 {
         if state(client) == wanted as u32 {
             return;
         }
-        client.listen(Time::from_ms(5));
+        client.listen(Time::from_ms(1));
     }
     panic!("{wanted} is not reached: {}", state(client));
 }
@@ -223,9 +223,14 @@ pub(crate) fn compiled(text: &str) -> Vec<u8> {
     written(text).bytes()
 }
 
-/// Writes a program to the board and lets it run.
-pub(crate) fn run(client: &mut Client<'_>, program: &[u8]) {
+/// Writes a program to the board.
+pub(crate) fn load(client: &mut Client<'_>, program: &[u8]) {
     let at = Address::new(panel::PROGRAM, 0);
     client.write(at, program, Protocol::Block).unwrap();
+}
+
+/// The same, and lets it run.
+pub(crate) fn run(client: &mut Client<'_>, program: &[u8]) {
+    load(client, program);
     command(client, RUN).unwrap();
 }

@@ -10,4 +10,5 @@ mod leader;
 mod modes;
 mod orders;
 mod programs;
+mod stops;
 mod troubles;

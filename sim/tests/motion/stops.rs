@@ -1,65 +1,24 @@
 //! What must not be lost: a stop while a program changes modes or homes, and in which mode
 //! a drive is when something comes in between of a change.
 
-mod common;
-
-use canmaster::id::Address;
+use canmaster::motion::mode::Mode;
 use canmaster::motion::{GroupState, panel};
-use canmaster::sdo::Protocol;
 use canmaster::{CobId, NodeId};
-use canmaster_network::Source;
 use canmaster_sim::drive::DriveFault;
 use canmaster_sim::time::Time;
-use canmaster_sim::world::{Client, Scenario, Stimulus, World, enabled};
+use canmaster_sim::world::{Client, Stimulus};
 
-use common::image;
+use crate::leader::{
+    AXES, ENABLE, QUICK_STOP, RESET, RUN, SET_MODES, STOP, command, compiled, in_standby, load,
+    state, until,
+};
 
-const MASTER: NodeId = NodeId::constant::<127>();
 const NODE: NodeId = NodeId::constant::<4>();
-const END: Time = Time::from_ms(90_000);
-const AXES: u8 = 6;
 /// Emergencies of the board: an axis has failed, and all errors have gone.
 const EMCY: u16 = 0x0FF;
 const AXIS_FAULT: [u8; 2] = [0x41, 0xFF];
 const OVERCURRENT: u16 = 0x2310;
-
-const ENABLE: u32 = 1;
-const STOP: u32 = 4;
-const QUICK_STOP: u32 = 6;
-const RESET: u32 = 7;
-const SET_MODES: u32 = 9;
-const RUN: u32 = 12;
-
-const CSP: u32 = 8;
-
-fn in_standby(seed: u64) -> Client<'static> {
-    let world = World::new(image(), Scenario::new(seed, END).unattended()).unwrap();
-    let mut client = Client::new(world, MASTER);
-    let all_enabled = |world: &World<'_>| world.statuses().flatten().all(|drive| enabled(&drive));
-    assert!(client.world.run_to(Time::from_ms(4000), all_enabled));
-    until(&mut client, GroupState::Standby);
-    client
-}
-
-fn command(client: &mut Client<'_>, command: u32) {
-    let done = client.put(panel::COMMAND, 0, command, 2);
-    assert_eq!(done, Ok(()), "{command}");
-}
-
-fn state(client: &mut Client<'_>) -> u32 {
-    client.number(panel::STATE, 0).unwrap()
-}
-
-#[track_caller]
-fn until(client: &mut Client<'_>, wanted: GroupState) {
-    for _ in 0..4000 {
-        if state(client) == wanted as u32 {
-            return;
-        }
-        client.listen(Time::from_ms(1));
-    }
-    panic!("{wanted} is not reached: {}", state(client));
-}
+const CSP: u32 = Mode::CyclicPosition as u32;
 
 fn truths(client: &Client<'_>) -> Vec<i32> {
     let positions = client.world.statuses().flatten();
@@ -68,16 +27,13 @@ fn truths(client: &Client<'_>) -> Vec<i32> {
 
 /// Modes, homing and a move.
 fn program() -> Vec<u8> {
-    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../network.toml");
-    let machine = canmaster_network::load(file.as_ref()).machine.unwrap();
-    let text = "unit = \"turns\"\nvelocity = 1000\nacceleration = 2000\n\
-        [[step]]\n[step.mode]\nis = \"cyclic synchronous position\"\n\
-        [[step]]\n[step.home]\n\
-        [[step]]\n[step.mode]\nis = \"cyclic synchronous velocity\"\n\
-        [[step]]\n[[step.move]]\nby = 20\n";
-    let source = Source::new("stops.toml", text.as_bytes());
-    let outcome = canmaster_network::program::read(&source, &machine);
-    outcome.program.unwrap().bytes()
+    compiled(
+        "unit = \"turns\"\nvelocity = 1000\nacceleration = 2000\n\
+         [[step]]\n[step.mode]\nis = \"cyclic synchronous position\"\n\
+         [[step]]\n[step.home]\n\
+         [[step]]\n[step.mode]\nis = \"cyclic synchronous velocity\"\n\
+         [[step]]\n[[step.move]]\nby = 20\n",
+    )
 }
 
 /// Standby, no program, and nothing moves for a while.
@@ -95,10 +51,8 @@ fn it_is_over(client: &mut Client<'_>) {
 
 #[test]
 fn a_stop_while_a_program_changes_modes_or_homes_ends_it() {
-    let bytes = program();
     let mut client = in_standby(71);
-    let at = Address::new(panel::PROGRAM, 0);
-    client.write(at, &bytes, Protocol::Normal).unwrap();
+    load(&mut client, &program());
     for button in [false, true] {
         for (state, later) in [
             (GroupState::ModeChange, 0),
@@ -108,14 +62,14 @@ fn a_stop_while_a_program_changes_modes_or_homes_ends_it() {
             (GroupState::Homing, 0),
             (GroupState::Homing, 100),
         ] {
-            command(&mut client, RUN);
+            command(&mut client, RUN).unwrap();
             until(&mut client, state);
             client.listen(Time::from_ms(later));
             if button {
                 client.world.press();
                 client.listen(Time::from_ms(200));
             } else {
-                command(&mut client, STOP);
+                command(&mut client, STOP).unwrap();
                 client.listen(Time::from_ms(50));
             }
             it_is_over(&mut client);
@@ -129,7 +83,7 @@ fn changing(seed: u64) -> Client<'static> {
     for axis in 1..=AXES {
         client.put(panel::MODE, axis, CSP, 1).unwrap();
     }
-    command(&mut client, SET_MODES);
+    command(&mut client, SET_MODES).unwrap();
     until(&mut client, GroupState::ModeChange);
     client.listen(Time::from_ms(seed % 4 * 7));
     client
@@ -177,14 +131,14 @@ fn a_fault_or_a_quick_stop_while_modes_change_leaves_no_doubt() {
         };
         client.world.apply(Stimulus::Drive { node: NODE, fault });
         until(&mut client, GroupState::Faulted);
-        command(&mut client, RESET);
+        command(&mut client, RESET).unwrap();
         nothing_is_in_doubt(&mut client, &before);
 
         let mut client = changing(seed);
         let before = truths(&client);
-        command(&mut client, QUICK_STOP);
+        command(&mut client, QUICK_STOP).unwrap();
         until(&mut client, GroupState::Idle);
-        command(&mut client, ENABLE);
+        command(&mut client, ENABLE).unwrap();
         nothing_is_in_doubt(&mut client, &before);
     }
 }
@@ -207,7 +161,7 @@ fn the_error_of_an_axis_stands_until_it_is_enabled_again() {
     let came = told.iter().filter(|data| data[..2] == AXIS_FAULT).count();
     let gone = told.iter().filter(|data| data[..2] == [0; 2]).count();
     assert_eq!((came, gone), (1, 0), "{told:02X?}");
-    command(&mut client, RESET);
+    command(&mut client, RESET).unwrap();
     until(&mut client, GroupState::Standby);
     client.listen(Time::from_ms(300));
     let told = client.heard_from(EMCY);
