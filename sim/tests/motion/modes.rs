@@ -99,11 +99,11 @@ fn a_stop_on_the_way_ends_the_motion_for_good() {
 #[test]
 fn torque_follows_its_path() {
     let mut client = in_standby(98);
-    set_modes(&mut client, ALL, Mode::CyclicTorque as u8);
     emergencies(&mut client);
     let from = positions(&mut client);
     let program = compiled(
-        "[[step]]\nsettle = false\n[[step.move]]\nto = [90, -90, 90, -90, 90, -90]\n\
+        "[[step]]\n[step.mode]\nis = \"cyclic synchronous torque\"\n\
+         [[step]]\nsettle = false\n[[step.move]]\nto = [90, -90, 90, -90, 90, -90]\n\
          velocity = 600\nacceleration = 6000\n\
          [[step]]\nwait_ms = 100\n\
          [[step]]\n[[step.move]]\nto = 0\nvelocity = 600\nacceleration = 6000\n",
