@@ -205,33 +205,36 @@ const NOW: Time = Time::ZERO;
 #[test]
 fn a_drive_that_never_confirms_ends_every_state_in_faulted() {
     let deaf = in_state(State::SwitchedOn, Trouble::Deaf);
+    // It comes to rest, but is never seen to be off.
+    let held = in_state(State::QuickStopActive, Trouble::Deaf);
     for (seed, to, fault, cause) in [
         (101, In::Enabling, deaf, Cause::NotEnabled),
-        (102, In::SetPoint, DEAF, Cause::NotDone),
-        (103, In::SetPointStop, DEAF, Cause::NotArrived),
-        (104, In::Homing, DEAF, Cause::NotDone),
-        (
-            105,
-            In::ModeChange,
-            DriveFault::ModeStuck { at: NOW },
-            Cause::ModeNotConfirmed,
-        ),
-        (
-            106,
-            In::ModeChange,
-            DriveFault::SdoDead { at: NOW },
-            Cause::ModeNotConfirmed,
-        ),
-        // It comes to rest, but is never seen to be off.
-        (
-            107,
-            In::QuickStop,
-            in_state(State::QuickStopActive, Trouble::Deaf),
-            Cause::NotEnabled,
-        ),
-        (108, In::Disabling, DEAF, Cause::NotEnabled),
+        (102, In::Homing, DEAF, Cause::NotDone),
+        (103, In::QuickStop, held, Cause::NotEnabled),
+        (104, In::Disabling, DEAF, Cause::NotEnabled),
     ] {
         ends(seed, to, fault, GroupState::Faulted, Some(cause));
+    }
+}
+
+#[test]
+fn a_set_point_or_its_end_that_is_never_confirmed_ends_in_faulted() {
+    for (seed, to, cause) in [
+        (105, In::SetPoint, Cause::NotDone),
+        (106, In::SetPointStop, Cause::NotArrived),
+    ] {
+        ends(seed, to, DEAF, GroupState::Faulted, Some(cause));
+    }
+}
+
+#[test]
+fn a_mode_that_is_never_confirmed_ends_in_faulted() {
+    for (seed, fault) in [
+        (107, DriveFault::ModeStuck { at: NOW }),
+        (108, DriveFault::SdoDead { at: NOW }),
+    ] {
+        let cause = Some(Cause::ModeNotConfirmed);
+        ends(seed, In::ModeChange, fault, GroupState::Faulted, cause);
     }
 }
 
