@@ -6,6 +6,7 @@
 //! itself takes its quick-stop ramp (6085h); one that its own error, STO or the loss
 //! of its supply has disabled coasts.
 
+use canmaster::motion::mode::Mode;
 use canmaster::network::Network;
 
 use crate::time::Time;
@@ -97,6 +98,24 @@ pub struct Limit {
     pub stands_by: Time,
     /// By whom.
     pub reaction: Reaction,
+}
+
+impl Limit {
+    /// The same for an axis in another mode than those of which the master makes the
+    /// ramp: what leads its own motion brakes on its own ramp, and one that follows a
+    /// torque gets none.
+    pub fn in_mode(self, mode: Mode) -> Limit {
+        let reaction = match (self.reaction, mode) {
+            (Reaction::Ramp, Mode::ProfilePosition | Mode::Homing) => Reaction::QuickStop,
+            (Reaction::Ramp, Mode::CyclicTorque) => Reaction::Coasts,
+            (reaction, _) => reaction,
+        };
+        Limit {
+            stands_by: self.stops_by + reaction_time(reaction),
+            reaction,
+            ..self
+        }
+    }
 }
 
 /// What the contract says of all axes.
@@ -224,6 +243,22 @@ mod tests {
         assert_eq!(of(Cause::DriveCutOff), ((204, 524), (12, 845)));
         assert_eq!(of(Cause::MasterReset), ((204, 524), (204, 524)));
         assert_eq!(of(Cause::MasterHangs), ((319, 639), (319, 639)));
+    }
+
+    #[test]
+    fn what_the_master_does_not_ramp_has_times_of_its_own() {
+        let others = |cause: Cause| cause.limits(&SIX_EPOS4, 3).others;
+        let ms = |mode| others(Cause::DriveDisabled).in_mode(mode).stands_by.as_ms();
+        for mode in Mode::ALL {
+            let by_itself = others(Cause::MasterReset);
+            assert_eq!(by_itself.in_mode(mode), by_itself);
+            let expected = match mode {
+                Mode::ProfilePosition | Mode::Homing => 328,
+                Mode::CyclicTorque => 7008,
+                _ => 841,
+            };
+            assert_eq!(ms(mode), expected, "{mode:?}");
+        }
     }
 
     #[test]

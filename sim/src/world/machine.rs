@@ -7,6 +7,7 @@ use std::sync::LazyLock;
 use canmaster::motion::experiment::Motor;
 use canmaster::network::Network;
 use canmaster::network::sample::SIX_EPOS4;
+use canmaster_network::Source;
 use canmaster_network::layout::{Cyclic, RpdoOrder};
 use canmaster_network::model;
 use canmaster_network::program::{self, Axis, Group, Program};
@@ -63,9 +64,7 @@ pub struct Machine {
 pub fn sample() -> &'static Machine {
     static SAMPLE: LazyLock<Machine> = LazyLock::new(|| {
         let motors = vec![Motor::SAMPLE; SIX_EPOS4.nodes.len()];
-        let axes = SIX_EPOS4.nodes.iter().zip(&motors);
-        let axes = axes.map(|(node, motor)| Axis::new(node.name.to_string(), described(motor)));
-        let group = Group::new(axes.collect(), SIX_EPOS4.cycle.as_micros());
+        let group = group(&SIX_EPOS4, &motors);
         let (moves, round_trip) = course(&program::pairs(&group), &group);
         Machine {
             network: &SIX_EPOS4,
@@ -157,6 +156,20 @@ impl Machine {
         self.round_trip
     }
 
+    /// The bytes of a program in TOML for this machine, whose axes are in profile
+    /// velocity mode when it begins.
+    ///
+    /// # Errors
+    /// What is wrong with it, for a person.
+    pub fn program(&self, name: &str, text: &str) -> Result<Vec<u8>, String> {
+        let source = Source::new(name, text.as_bytes());
+        let outcome = program::read_for(&source, &group(self.network, &self.motors));
+        let problems = || outcome.problems.iter().map(ToString::to_string);
+        let program = outcome.program.as_ref();
+        let bytes = program.map(Program::bytes);
+        bytes.ok_or_else(|| problems().collect::<Vec<String>>().join("\n"))
+    }
+
     /// What has to be on a bus in every cycle.
     pub fn traffic(&self, segment: &Segment) -> Traffic {
         let node = |axis: &usize| self.network.nodes.get(*axis).map(|node| node.id);
@@ -193,6 +206,13 @@ fn course(program: &Program, group: &Group) -> Moves {
     let moves = rests.map(|rest| rest.into_iter().map(part).collect());
     let whole = Time::from_us(course.cycles * u64::from(group.cycle_us));
     (moves.collect(), (!course.endless).then_some(whole))
+}
+
+/// The axes of a network as programs know them.
+fn group(network: &Network, motors: &[Motor]) -> Group {
+    let axes = network.nodes.iter().zip(motors);
+    let axes = axes.map(|(node, motor)| Axis::new(node.name.to_string(), described(motor)));
+    Group::new(axes.collect(), network.cycle.as_micros())
 }
 
 /// A motor as the description has it.

@@ -1,14 +1,16 @@
 //! A random fault at a random moment with each seed: the contract for faults, on
 //! the emulated board.
 
+use std::collections::BTreeMap;
 use std::process::ExitCode;
 use std::time::Instant;
 
 use anyhow::Result;
+use canmaster::motion::GroupState;
 use canmaster_sim::judge::Cause;
 use canmaster_sim::time::Time;
 use canmaster_sim::world::Image;
-use canmaster_sim::world::strike::{Strike, Struck};
+use canmaster_sim::world::strike::{MODES, Strike, Struck};
 use serde::Serialize;
 
 use super::pool;
@@ -20,7 +22,17 @@ struct Report {
     result: &'static str,
     seeds: u64,
     wall_s: f64,
+    /// How many strikes came in each state of the group and mode of the drives.
+    struck: Vec<Count>,
     runs: Vec<Row>,
+}
+
+/// How many strikes came in a state, in each mode.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+struct Count {
+    state: String,
+    strikes: usize,
+    modes: BTreeMap<&'static str, usize>,
 }
 
 /// One seed.
@@ -31,7 +43,13 @@ struct Row {
     reason: String,
     cause: &'static str,
     node: u8,
+    /// Who led the group to the moment, and what was ordered or done last.
+    led_by: String,
     phase: String,
+    /// At the moment of the fault.
+    at_s: Option<f64>,
+    state: Option<String>,
+    mode: Option<&'static str>,
     wall_s: f64,
     #[serde(flatten)]
     figures: Option<Figures>,
@@ -42,7 +60,6 @@ struct Row {
 /// What was measured, in the plant.
 #[derive(Clone, Copy, Debug, Serialize)]
 struct Figures {
-    at_s: f64,
     /// From the fault until the axes stood that still had torque.
     stood_ms: Option<f64>,
     allowed_ms: f64,
@@ -86,11 +103,16 @@ pub(super) fn command(images: &Images, seeds: u64, workers: usize, json: bool) -
                         seed,
                         cause,
                         node,
+                        led_by,
                         phase,
+                        state,
                         reason,
                         ..
                     } = row;
-                    eprintln!("seed {seed}, {cause}, node {node}, {phase}: {reason}");
+                    let state = state.as_deref().unwrap_or("not led there");
+                    eprintln!(
+                        "seed {seed}, {cause}, node {node}, {led_by}, {phase} ({state}): {reason}"
+                    );
                 });
             }
         },
@@ -105,11 +127,13 @@ pub(super) fn command(images: &Images, seeds: u64, workers: usize, json: bool) -
             result,
             seeds,
             wall_s,
+            struck: counts(&runs),
             runs,
         };
         println!("{}", serde_json::to_string(&report)?);
     } else {
         println!("{}", as_table(&runs));
+        println!("{}", states_table(&counts(&runs)));
         println!("{ok} of {} runs ok, in {wall_s:.0} s", runs.len());
     }
     Ok(if all_ok {
@@ -124,7 +148,7 @@ impl Row {
         let started = Instant::now();
         let nodes = images.sample.machine().network().nodes;
         let strike = Strike::random(seed, nodes.len());
-        let outcome = strike.run(images.of(&strike), seed);
+        let (moment, outcome) = strike.run(images.of(&strike), seed);
         Row {
             seed,
             ok: outcome.is_ok(),
@@ -132,7 +156,11 @@ impl Row {
             reason: outcome.err().map(|e| e.to_string()).unwrap_or_default(),
             cause: strike.cause.words(),
             node: nodes[strike.axis].id.get(),
+            led_by: strike.leader.to_string(),
             phase: strike.phase.to_string(),
+            at_s: moment.as_ref().map(|moment| moment.at.as_secs_f64()),
+            state: moment.as_ref().map(|moment| moment.state.to_string()),
+            mode: moment.as_ref().map(|moment| moment.mode),
             wall_s: started.elapsed().as_secs_f64(),
             kind: Some(strike.cause),
         }
@@ -142,7 +170,6 @@ impl Row {
 impl Figures {
     fn of(struck: &Struck) -> Figures {
         Figures {
-            at_s: struck.at.as_secs_f64(),
             stood_ms: struck.stood_after.map(ms),
             allowed_ms: ms(struck.allowed),
             coasted_ms: struck.coasted.map(ms),
@@ -194,23 +221,85 @@ fn as_table(runs: &[Row]) -> comfy_table::Table {
     table
 }
 
+/// How many strikes came in which state and mode: all states, so that a hole is seen.
+fn counts(runs: &[Row]) -> Vec<Count> {
+    let of = |state: GroupState| {
+        let state = state.to_string();
+        let there = runs.iter().filter(|row| row.state.as_ref() == Some(&state));
+        let mut modes = BTreeMap::new();
+        for mode in there.filter_map(|row| row.mode) {
+            *modes.entry(mode).or_default() += 1;
+        }
+        Count {
+            state,
+            strikes: modes.values().sum(),
+            modes,
+        }
+    };
+    GroupState::ALL.into_iter().map(of).collect()
+}
+
+fn states_table(counts: &[Count]) -> comfy_table::Table {
+    let mut heading = vec!["state of the group", "strikes"];
+    heading.extend(MODES);
+    let mut table = table::new(&heading);
+    let columns: Vec<usize> = (1..heading.len()).collect();
+    table::align_right(&mut table, &columns);
+    for Count {
+        state,
+        strikes,
+        modes,
+    } in counts
+    {
+        let in_mode = |mode| modes.get(mode).map_or("-".into(), usize::to_string);
+        let mut cells = vec![state.clone(), strikes.to_string()];
+        cells.extend(MODES.map(in_mode));
+        table.add_row(cells);
+    }
+    table
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn two_hundred_seeds_have_every_cause_in_motion_and_every_phase() {
+    fn two_hundred_seeds_have_every_cause_in_motion_every_phase_and_every_leader() {
         let strikes: Vec<Strike> = (1..=200).map(|seed| Strike::random(seed, 6)).collect();
         for cause in Cause::ALL {
-            let in_motion =
-                |strike: &&Strike| strike.cause == cause && strike.phase.to_string() == "motion";
+            let moves = |strike: &Strike| {
+                let phase = strike.phase.to_string();
+                let moving = ["release", "motion", "homing", "stop", "halt", "quick stop"];
+                moving.contains(&phase.as_str())
+            };
+            let in_motion = |strike: &&Strike| strike.cause == cause && moves(strike);
             assert!(strikes.iter().filter(in_motion).count() >= 3, "{cause:?}");
         }
-        for phase in ["start", "standby", "release", "motion", "stop"] {
+        for phase in [
+            "start",
+            "standby",
+            "release",
+            "motion",
+            "stop",
+            "homing",
+            "mode change",
+            "halt",
+            "quick stop",
+            "disable",
+            "enable",
+        ] {
             let there = strikes
                 .iter()
                 .any(|strike| strike.phase.to_string() == phase);
             assert!(there, "{phase}");
+        }
+        let led_by = |words: &str| {
+            let led = |strike: &&Strike| strike.leader.to_string().contains(words);
+            strikes.iter().filter(led).count()
+        };
+        assert!(led_by("button") >= 40 && led_by("client") >= 90 && led_by("program") >= 30);
+        for mode in ["position", "velocity", "torque", "homing", "mixed", "tour"] {
+            assert!(led_by(mode) >= 5, "{mode}");
         }
         for axis in 0..6 {
             assert!(strikes.iter().any(|strike| strike.axis == axis));
@@ -225,10 +314,13 @@ mod tests {
             reason: String::new(),
             cause: cause.words(),
             node: 1,
+            led_by: "button".into(),
             phase: "motion".into(),
+            at_s: Some(3.0),
+            state: Some("moving".into()),
+            mode: Some("profile velocity"),
             wall_s: 1.0,
             figures: ok.then_some(Figures {
-                at_s: 3.0,
                 stood_ms: Some(432.1),
                 allowed_ms: 865.0,
                 coasted_ms: None,
@@ -243,5 +335,14 @@ mod tests {
         let cells: Vec<&str> = line.unwrap().split_whitespace().skip(3).collect();
         assert_eq!(cells, ["2", "1", "432", "865", "-", "4", "0"]);
         assert!(!text.contains("heartbeat"));
+        let struck = counts(&runs);
+        assert_eq!(struck.len(), GroupState::ALL.len());
+        let moving = struck.iter().find(|count| count.state == "moving").unwrap();
+        assert_eq!((moving.strikes, moving.modes["profile velocity"]), (2, 2));
+        let text = states_table(&struck).to_string();
+        let hole = text
+            .lines()
+            .find(|line| line.contains("homing ") && !line.contains("state"));
+        assert!(hole.unwrap().contains(" 0 "));
     }
 }
