@@ -360,6 +360,10 @@ impl<const N: usize> Panel<N> {
         let room = self.program.get_mut(from..to);
         let (Some(room), true) = (room, size <= PROGRAM_BYTES) else {
             self.cancel();
+            let mut why = Refusal::NONE;
+            let done = why.because(Reason::Length, size as u32, PROGRAM_BYTES as u32);
+            // That has a code of its own.
+            let _ = self.note(done, &why);
             return Err(AbortCode::TOO_LONG);
         };
         room.copy_from_slice(part.data);

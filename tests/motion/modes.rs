@@ -147,6 +147,35 @@ fn a_set_point_replaces_the_running_one() {
     assert!((rig.drives[0].position - f64::from(home + 1000)).abs() < 5.0);
 }
 
+/// Where the set-point is stays on the wire, also when the drive has taken it.
+#[test]
+fn a_set_point_that_is_taken_stays_the_target() {
+    let mut rig = Rig::in_mode(3, Mode::ProfilePosition);
+    rig.released();
+    rig.arrive(20);
+    let home = rig.group.view(0).unwrap().home;
+    let set_point = SetPoint {
+        target: home + 60_000,
+        immediately: true,
+        ..SetPoint::default()
+    };
+    assert!(rig.group.ask(0, &set_point));
+    for cycle in 0..30 {
+        rig.step(READY);
+        assert_eq!(rig.commands[0].target, home + 60_000, "cycle {cycle}");
+    }
+}
+
+#[test]
+fn in_homing_nothing_follows_a_target() {
+    let mut rig = Rig::in_mode(3, Mode::Homing);
+    rig.released();
+    let parts = core::array::from_fn(far);
+    let refused = rig.director.go(&rig.group, ALL, &parts, 0).unwrap_err();
+    assert_eq!((refused.reason, refused.axis), (Reason::WrongMode, 0));
+    assert_eq!(refused.value, Mode::Homing as i32);
+}
+
 /// Of axes in several modes all are judged before the first is told anything, and
 /// set-points are handed over in the SYNC in which the paths begin.
 #[test]
@@ -381,4 +410,25 @@ fn a_torque_is_ramped_and_stops() {
         rig.step(READY);
     }
     assert!(rig.commands.iter().all(|command| command.target == 0));
+}
+
+/// What the torque does to an axis is not the group's business: the move is done with its
+/// path, though the axes turn faster and faster.
+#[test]
+fn a_torque_is_there_at_the_end_of_its_path() {
+    let mut rig = Rig::in_mode(5, Mode::CyclicTorque);
+    rig.released();
+    rig.go(|_| AxisMove {
+        target: 200,
+        velocity: 1000,
+        acceleration: 4000,
+        deceleration: 4000,
+        set: 0,
+    });
+    rig.arrive(400);
+    for _ in 0..600 {
+        rig.step(READY);
+        assert_eq!(rig.group.state(), GroupState::Moving, "{}", rig.last());
+    }
+    assert!(rig.drives.iter().all(|drive| drive.velocity.abs() > 50.0));
 }

@@ -322,6 +322,8 @@ fn a_program_that_cannot_be_run_is_refused() {
         desk.write(0, &[0; PROGRAM_BYTES + 1], true),
         Err(AbortCode::TOO_LONG)
     );
+    let long = 0xFF10_0000 | (PROGRAM_BYTES as u32 + 1);
+    assert_eq!(desk.get(panel::REFUSAL, 0) as u32, long);
     desk.write(0, &[1], false).unwrap();
     desk.panel.cancel();
     assert_eq!(desk.panel.program(), None);

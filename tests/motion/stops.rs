@@ -170,7 +170,8 @@ fn a_move_and_a_search_for_home_exclude_each_other() {
         axes: ALL & !1,
         limit: 300,
     };
-    rig.go(crate::rig::far);
+    let parts = core::array::from_fn(crate::rig::far);
+    rig.director.go(&rig.group, 1, &parts, 0).unwrap();
     rig.step(READY);
     assert!(rig.group.order(home).is_err(), "an axis moves");
     rig.order(Order::Stop);

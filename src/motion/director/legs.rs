@@ -50,11 +50,17 @@ impl<const N: usize> Director<N> {
         let why = &mut self.error;
         *why = Refusal::NONE;
         why.axis = axis as u8;
-        let torque = of.mode() == Mode::CyclicTorque;
-        if self.running && torque != (part.set & TORQUE != 0) {
-            // The numbers of the program mean something else in this mode.
-            let (mode, allowed) = (of.mode() as u32, Mode::CyclicTorque as u32);
-            return why.because(Reason::WrongMode, mode, allowed);
+        let mode = of.mode();
+        let torque = mode == Mode::CyclicTorque;
+        let marked = part.set & TORQUE != 0;
+        // The numbers of a program may mean something else in this mode; and in that of
+        // homing nothing follows a target.
+        if self.running && torque != marked || mode == Mode::Homing {
+            let allowed = match marked {
+                true => Mode::CyclicTorque,
+                false => Mode::ProfileVelocity,
+            };
+            return why.because(Reason::WrongMode, mode as u32, allowed as u32);
         }
         let (home, scale) = if torque {
             (0, limits.scale.of_units())

@@ -7,6 +7,7 @@ use super::axis::{
 use super::{Group, ModeWanted, bit};
 use crate::cia402::Goal;
 use crate::motion::contract::{Cell, Event, cell};
+use crate::motion::mode::Mode;
 use crate::motion::{AxisConfig, Cause, GroupConfig, GroupEvent, GroupState, fixed, greater, next};
 
 impl<const N: usize> Group<N> {
@@ -189,7 +190,9 @@ impl<const N: usize> Group<N> {
                 late = axis.led.is_late(axis.mode(), limit);
                 cause = Cause::NotDone.with(axis.mode() as i32);
             } else {
-                done = axis.seen & rest != 0;
+                // A torque is not expected to lead anywhere.
+                let torque = on_target && axis.mode() == Mode::CyclicTorque;
+                done = torque || axis.seen & rest != 0;
                 late = axis.waited() > config.cycles(config.settle_timeout);
                 cause = Cause::NotArrived.with(axis.error());
             }

@@ -295,7 +295,6 @@ impl Axis {
         let holds = self.mode() == Mode::ProfilePosition;
         // From what it holds already the next one may count.
         let position = self.led.held().filter(|_| holds).unwrap_or(position);
-        self.samples = [Sample::at_rest(position); RING];
         self.end_at(position);
         self.led.rest(holds.then_some(position));
     }
@@ -308,6 +307,7 @@ impl Axis {
     /// Its drive leads it to `position` by itself.
     pub(super) fn end_at(&mut self, position: i32) {
         self.path.restart(&Point::at_rest(position));
+        self.samples = [Sample::at_rest(position); RING];
         self.over = 0;
     }
 
