@@ -431,4 +431,5 @@ fn a_torque_is_there_at_the_end_of_its_path() {
         assert_eq!(rig.group.state(), GroupState::Moving, "{}", rig.last());
     }
     assert!(rig.drives.iter().all(|drive| drive.velocity.abs() > 50.0));
+    assert!(rig.group.order(Order::Finish).is_err(), "the axes turn");
 }

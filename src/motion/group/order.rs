@@ -97,6 +97,8 @@ impl<const N: usize> Group<N> {
             {
                 return why.busy();
             }
+            // A torque that is done may leave its axis turning.
+            Order::Finish if self.here() & !self.which(SLOW) != 0 => return why.busy(),
             Order::Stop | Order::QuickStop => {}
             _ if self.ordered.event().is_some() => return why.busy(),
             _ => self.permit(order, why)?,
