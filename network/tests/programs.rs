@@ -185,6 +185,68 @@ fn the_course_knows_every_rest() {
     assert!(homing.rests.iter().all(|rest| rest[2].is_none()));
 }
 
+/// A sine that turns slowly, or a trapezoid that rests, may be seen to rest there: as
+/// it is passed; and the course is not over before.
+#[test]
+fn the_course_knows_where_a_path_is_slow() {
+    let group = Group::of(&sample()).unwrap();
+    let stops = |text: &str| {
+        let course = compiled(text).course(&group);
+        let of_axis = course.rests.iter().filter_map(|rest| rest[2]);
+        let of_axis: Vec<_> = of_axis.map(|stop| (stop.target, stop.sure)).collect();
+        (of_axis, course.least)
+    };
+    let sine = |cycles: u32| {
+        format!(
+            "[[step]]\n[step.sine]\naxes = [\"axis 3\"]\namplitude = 3000\npoints = 36\n\
+             cycles = {cycles}\nperiods = 2"
+        )
+    };
+    let (slow, least) = stops(&sine(24));
+    let sure: Vec<bool> = slow.iter().map(|stop| stop.1).collect();
+    assert_eq!(sure, [false, false, false, true]);
+    for (stop, target) in slow.iter().zip([6000, 0, 6000, 0]) {
+        assert!((stop.0 - target).abs() <= 15, "{slow:?}");
+    }
+    assert!((1500..=2 * 36 * 24).contains(&least), "{least}");
+    assert_eq!(stops(&sine(4)), (vec![(0, true)], 0));
+    let trapezoid = "[[step]]\n[step.trapezoid]\naxes = [\"axis 3\"]\namplitude = 3000\n\
+                     ramp_ms = 100\nspeed_ms = 200\nrest_ms = 300";
+    assert_eq!(stops(trapezoid).0, [(3000, false), (0, true)]);
+}
+
+/// Axes that do the same stop together, unless they end so softly that it cannot be seen.
+#[test]
+fn axes_of_a_fast_sine_stop_together() {
+    let group = Group::of(&sample()).unwrap();
+    let together = |cycles: u32| {
+        let course = compiled(&format!(
+            "[[step]]\n[step.sine]\namplitude = 3000\npoints = 36\ncycles = {cycles}"
+        ))
+        .course(&group);
+        let end = course.rests.last().unwrap();
+        end[0].unwrap().set == end[5].unwrap().set
+    };
+    assert!(together(3));
+    assert!(!together(24));
+}
+
+/// An axis that a table holds where it is has no rest to be seen.
+#[test]
+fn what_does_not_move_has_no_rest() {
+    let group = Group::of(&sample()).unwrap();
+    let table = |points: &str| {
+        compiled(&format!(
+            "[[step]]\n[step.table]\naxes = [\"axis 1\"]\nevery_ms = 100\npoints = {points}"
+        ))
+    };
+    let course = table("[[0], [0]]").course(&group);
+    assert!(course.rests.is_empty());
+    assert_eq!((course.least, course.endless), (18, false));
+    let moved = table("[[100], [0]]").course(&group);
+    assert_eq!(moved.rests.len(), 1);
+}
+
 #[test]
 fn a_description_names_its_program() {
     let text = std::fs::read_to_string(workspace().join("network.toml")).unwrap();

@@ -1,7 +1,7 @@
 //! What a program does to the axes: where they come to rest, and when it is done.
 
 use super::axes::{CYCLIC_TORQUE, Group};
-use super::{Action, Program, Step, timing};
+use super::{Action, Path, Program, Step, slow, timing};
 
 /// Between the end of a reference and the next step when nothing disturbs the axes:
 /// delay of the loop, last increments, confirmation, planning.
@@ -24,6 +24,9 @@ pub struct Course {
     pub rests: Vec<Vec<Option<Stop>>>,
     /// How long it takes, in SYNC cycles.
     pub cycles: u64,
+    /// It is not over before, in SYNC cycles, however its axes stand meanwhile; 0: it is
+    /// as soon as they have been at all of their rests.
+    pub least: u64,
     /// It does not end by itself, or is too long to be followed.
     pub endless: bool,
 }
@@ -39,6 +42,9 @@ pub struct Stop {
     pub set: u8,
     /// It is seen to rest there; else the next step may begin at once.
     pub sure: bool,
+    /// So many increments beside it, it may be so slow already that it seems to rest, or
+    /// seem to rest while it passes.
+    pub within: u32,
 }
 
 /// Numbers for what is alike, from 1.
@@ -65,6 +71,10 @@ struct Walk<'a> {
     /// In this step.
     moved: Vec<Option<Stop>>,
     left: usize,
+    /// At least so many cycles, if nothing goes on meanwhile.
+    least: u64,
+    /// Who only looks at the axes can take a moment on the way for the end.
+    held: bool,
 }
 
 impl Program {
@@ -77,9 +87,15 @@ impl Program {
             modes: group.axes.iter().map(|axis| axis.mode).collect(),
             moved: vec![None; self.axes],
             left: STEPS_MAX,
+            least: 0,
+            held: false,
         };
         walk.steps(&self.steps);
         walk.rest();
+        if walk.held || walk.course.rests.is_empty() {
+            // The board's clock is not exact, and it may begin nearer.
+            walk.course.least = walk.least * 9 / 10;
+        }
         walk.course
     }
 }
@@ -112,6 +128,7 @@ impl Walk<'_> {
                 target: to as i32,
                 set,
                 sure: false,
+                within: 0,
             });
         }
         self.at[axis] = to;
@@ -141,12 +158,14 @@ impl Walk<'_> {
                     self.go(part.axis, to, set);
                 }
                 self.pass();
+                self.least += u64::from(cycles);
                 self.course.cycles += u64::from(cycles) + SETTLING_CYCLES;
             }
             Action::Wait { cycles } => {
                 if *cycles >= self.group.cycles(REST_MS) {
                     self.rest();
                 }
+                self.least += u64::from(*cycles);
                 self.course.cycles += u64::from(*cycles);
             }
             Action::Repeat { times, steps } => {
@@ -156,25 +175,7 @@ impl Walk<'_> {
                     self.steps(steps);
                 }
             }
-            Action::Path(path) => {
-                let cycles = path.points.iter().map(|point| u64::from(point.cycles));
-                self.course.cycles += cycles.sum::<u64>() * u64::from(path.periods);
-                self.course.cycles += SETTLING_CYCLES;
-                let mut alike = Alike::default();
-                for (member, of) in path.members.iter().enumerate() {
-                    let last = path.points.last();
-                    let end = last.map_or(0.0, |last| path.at(member, last).0);
-                    let to = self.at[of.axis] + end.round() as i64;
-                    let shape = if path.shared { 0 } else { member as u8 };
-                    let set = alike.number((shape, i64::from(of.amplitude).abs()));
-                    self.go(of.axis, to, set);
-                    // It moved, wherever it ends.
-                    let target = self.at[of.axis] as i32;
-                    let sure = false;
-                    self.moved[of.axis] = Some(Stop { target, set, sure });
-                }
-                self.pass();
-            }
+            Action::Path(path) => self.path(path),
             Action::Home { axes, limit } => {
                 self.rest();
                 for axis in 0..self.at.len() {
@@ -194,5 +195,49 @@ impl Walk<'_> {
                 self.course.cycles += u64::from(self.group.cycles(MODE_MS));
             }
         }
+    }
+
+    fn path(&mut self, path: &Path) {
+        let cycles = path.points.iter().map(|point| u64::from(point.cycles));
+        let cycles = cycles.sum::<u64>() * u64::from(path.periods);
+        self.least += cycles;
+        self.course.cycles += cycles + SETTLING_CYCLES;
+        let mut alike = Alike::default();
+        for (member, of) in path.members.iter().enumerate() {
+            let begin = self.at[of.axis];
+            let last = path.points.last();
+            let end = last.map_or(0.0, |last| path.at(member, last).0);
+            let shape = if path.shared { 0 } else { member as u8 };
+            let set = alike.number((shape, i64::from(of.amplitude).abs()));
+            self.at[of.axis] = begin + end.round() as i64;
+            let slow = slow::of(self.group, path, member);
+            if !slow.seen {
+                self.held = true;
+                continue;
+            }
+            let set = match slow.soft {
+                true => alike.number((u8::MAX, member as i64)),
+                false => set,
+            };
+            self.held |= slow.end > 0 || !slow.places.is_empty();
+            for (place, within) in slow.places {
+                let mut rest = vec![None; self.at.len()];
+                rest[of.axis] = Some(Stop {
+                    target: (begin + place) as i32,
+                    set,
+                    sure: false,
+                    within,
+                });
+                self.course.rests.push(rest);
+            }
+            // It moved, wherever it ends.
+            self.moved[of.axis] = Some(Stop {
+                target: self.at[of.axis] as i32,
+                set,
+                sure: false,
+                within: slow.end,
+            });
+        }
+        self.pass();
     }
 }

@@ -12,6 +12,7 @@ mod description;
 mod pairs;
 mod read;
 mod shape;
+mod slow;
 mod timing;
 mod units;
 

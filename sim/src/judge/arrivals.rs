@@ -17,6 +17,8 @@ pub struct Part {
     pub set: u8,
     /// It is seen to rest there; else its next part may begin at once.
     pub sure: bool,
+    /// So many increments beside the target it may seem to rest: it is slow there.
+    pub within: u32,
 }
 
 /// What the firmware's program asks of the axes.
@@ -27,6 +29,9 @@ pub struct Assignment {
     pub moves: Vec<Vec<Option<Part>>>,
     /// SYNC period: axes of one set have to stop within it.
     pub cycle: Time,
+    /// A release is not over before, however the axes stand meanwhile; 0: it is as soon
+    /// as they have made all of their moves.
+    pub least: Time,
 }
 
 impl Assignment {
@@ -71,25 +76,31 @@ pub struct Arrival {
     pub set: u8,
     /// Where it should be, increments.
     pub target: i32,
-    /// Greatest distance of the true position from there while at rest.
+    /// Greatest distance of the true position from there, or from where it may seem to
+    /// rest, while at rest.
     pub error: i64,
     /// Last moment above 5 rpm.
     pub stopped: Time,
 }
 
 /// Which of its `parts` an axis at `home` has made with each of its movements. One that
-/// ends at no place between is the next that is sure.
+/// ends at no place between is the next that is sure. Where it passes slowly it may have
+/// seemed to rest or not; if the program is `over`, its last movement led to the end.
 pub fn matched<'m>(
     movements: impl Iterator<Item = &'m Movement>,
     parts: &[(usize, Part)],
     home: i32,
+    over: bool,
 ) -> Vec<(&'m Movement, usize, Part)> {
     let mut left = parts;
     let mut all = Vec::new();
     for movement in movements.filter(|movement| movement.settled) {
         let sure = left.iter().position(|(_, part)| part.sure);
         let next = &left[..sure.map_or(left.len(), |sure| sure + 1)];
-        let near = |part: &Part| movement.error(home.wrapping_add(part.target)) <= NEAR;
+        let near = |part: &Part| {
+            let error = movement.error(home.wrapping_add(part.target));
+            error <= NEAR.max(part.within.into())
+        };
         let made = next.iter().position(|(_, part)| near(part));
         let made = made.unwrap_or(next.len().saturating_sub(1));
         let Some(&(step, part)) = left.get(made) else {
@@ -97,6 +108,14 @@ pub fn matched<'m>(
         };
         all.push((movement, step, part));
         left = &left[made + 1..];
+    }
+    if over
+        && parts.iter().any(|(_, part)| part.within > 0)
+        && let (Some(made), Some((&(step, part), between))) = (all.last_mut(), left.split_last())
+        && !between.iter().any(|(_, part)| part.sure)
+        && made.0.error(home.wrapping_add(part.target)) <= NEAR.max(part.within.into())
+    {
+        (made.1, made.2) = (step, part);
     }
     all
 }
@@ -122,7 +141,7 @@ pub fn arrivals(
                 continue;
             };
             let parts: Vec<(usize, Part)> = assignment.of_axis(axis).collect();
-            for (movement, step, part) in matched(movements, &parts, home) {
+            for (movement, step, part) in matched(movements, &parts, home, release.done.is_some()) {
                 let target = home.wrapping_add(part.target);
                 all.push(Arrival {
                     node,
@@ -131,7 +150,7 @@ pub fn arrivals(
                     step,
                     set: part.set,
                     target,
-                    error: movement.error(target),
+                    error: (movement.error(target) - i64::from(part.within)).max(0),
                     stopped: movement.stopped,
                 });
             }
@@ -185,7 +204,8 @@ mod tests {
                 Some(Part {
                     target,
                     set: 1,
-                    sure: true
+                    sure: true,
+                    within: 0,
                 });
                 2
             ]
@@ -193,6 +213,7 @@ mod tests {
         Assignment {
             moves: vec![both(20_000), both(0)],
             cycle: Time::from_ms(10),
+            least: Time::ZERO,
         }
     }
 
@@ -244,6 +265,7 @@ mod tests {
             target,
             set: 1,
             sure,
+            within: 0,
         };
         let parts = [
             part(500, false),
@@ -260,7 +282,7 @@ mod tests {
                 from = *to;
             }
             let movements = axis.movements().iter();
-            let matched = matched(movements, &parts, 100);
+            let matched = matched(movements, &parts, 100, true);
             matched.into_iter().map(|(_, step, _)| step).collect()
         };
         assert_eq!(steps(&[300.0, 100.0]), [2, 3]);
@@ -268,6 +290,42 @@ mod tests {
         assert_eq!(steps(&[1003.0, 300.0]), [1, 2]);
         // Nowhere: beside the next that is sure.
         assert_eq!(steps(&[750.0, 100.0, 400.0]), [2, 3]);
+    }
+
+    #[test]
+    fn where_an_axis_is_slow_it_may_seem_to_rest_or_not() {
+        let part = |target, sure, within| Part {
+            target,
+            set: 1,
+            sure,
+            within,
+        };
+        // There and back twice.
+        let parts = [
+            part(900, false, 80),
+            part(0, false, 80),
+            part(900, false, 80),
+            part(0, true, 2),
+        ];
+        let parts: Vec<(usize, Part)> = parts.into_iter().enumerate().collect();
+        let steps = |stops: &[f64], over: bool| -> Vec<usize> {
+            let mut axis = AxisMonitor::default();
+            let mut from = 100.0;
+            for (n, to) in (1..).zip(stops) {
+                drive(&mut axis, 2000 * n, from, *to, 1);
+                from = *to;
+            }
+            let movements = axis.movements().iter();
+            let matched = matched(movements, &parts, 100, over);
+            matched.into_iter().map(|(_, step, _)| step).collect()
+        };
+        assert_eq!(steps(&[930.0, 100.0, 1000.0, 100.0], true), [0, 1, 2, 3]);
+        assert_eq!(steps(&[1070.0], false), [0]);
+        assert_eq!(steps(&[1000.0, 100.0], false), [0, 1]);
+        assert_eq!(steps(&[1000.0, 100.0], true), [0, 3]);
+        assert_eq!(steps(&[100.0], true), [3]);
+        // Elsewhere it must not rest: far beside its end.
+        assert_eq!(steps(&[600.0], true), [3]);
     }
 
     #[test]

@@ -284,11 +284,13 @@ mod tests {
                     Some(Part {
                         target: 7,
                         set: 1,
-                        sure: true
+                        sure: true,
+                        within: 0
                     });
                     2
                 ]],
                 cycle: Time::from_ms(10),
+                least: Time::ZERO,
             },
             releases: &case.releases,
             arrivals: &case.arrivals,

@@ -58,6 +58,7 @@ pub struct Machine {
     motors: Vec<Motor>,
     moves: Vec<Vec<Option<Part>>>,
     round_trip: Option<Time>,
+    least: Time,
 }
 
 /// The sample: six EPOS4.
@@ -65,13 +66,18 @@ pub fn sample() -> &'static Machine {
     static SAMPLE: LazyLock<Machine> = LazyLock::new(|| {
         let motors = vec![Motor::SAMPLE; SIX_EPOS4.nodes.len()];
         let group = group(&SIX_EPOS4, &motors);
-        let (moves, round_trip) = course(&program::pairs(&group), &group);
+        let Moves {
+            moves,
+            round_trip,
+            least,
+        } = course(&program::pairs(&group), &group);
         Machine {
             network: &SIX_EPOS4,
             segments: vec![sample_segment()],
             motors,
             moves,
             round_trip,
+            least,
         }
     });
     &SAMPLE
@@ -112,13 +118,18 @@ impl Machine {
         let (Some(group), Some(program)) = (group, &described.program) else {
             return Err(none());
         };
-        let (moves, round_trip) = course(program, &group);
+        let Moves {
+            moves,
+            round_trip,
+            least,
+        } = course(program, &group);
         Ok(Machine {
             network,
             segments: segments(described),
             motors,
             moves,
             round_trip,
+            least,
         })
     }
 
@@ -148,6 +159,7 @@ impl Machine {
         Assignment {
             moves: self.moves.clone(),
             cycle: Time::from(self.network.cycle),
+            least: self.least,
         }
     }
 
@@ -187,8 +199,15 @@ const AXES_MAX: usize = 16;
 /// No run is so long that a program is repeated so often.
 const NEVER: usize = 1000;
 
-/// Where each axis has to come to rest, and how long that takes.
-type Moves = (Vec<Vec<Option<Part>>>, Option<Time>);
+/// What a program asks for.
+struct Moves {
+    /// Where each axis has to come to rest.
+    moves: Vec<Vec<Option<Part>>>,
+    /// How long that takes.
+    round_trip: Option<Time>,
+    /// It is not over before, however the axes stand meanwhile.
+    least: Time,
+}
 
 /// What a program asks for, as the description has it and nobody else.
 fn course(program: &Program, group: &Group) -> Moves {
@@ -198,14 +217,19 @@ fn course(program: &Program, group: &Group) -> Moves {
             target: stop.target,
             set: stop.set,
             sure: stop.sure,
+            within: stop.within,
         })
     };
     // One that does not end is never seen to have ended.
     let times = if course.endless { NEVER } else { 1 };
     let rests = std::iter::repeat_n(course.rests, times).flatten();
     let moves = rests.map(|rest| rest.into_iter().map(part).collect());
-    let whole = Time::from_us(course.cycles * u64::from(group.cycle_us));
-    (moves.collect(), (!course.endless).then_some(whole))
+    let time = |cycles: u64| Time::from_us(cycles * u64::from(group.cycle_us));
+    Moves {
+        moves: moves.collect(),
+        round_trip: (!course.endless).then_some(time(course.cycles)),
+        least: time(course.least),
+    }
 }
 
 /// The axes of a network as programs know them.
@@ -325,7 +349,9 @@ mod tests {
             (8, &[1, 2, 1, 2, 3, 3, 4, 4]),
             (12, &[1, 2, 1, 2, 3, 3, 4, 5, 4, 5, 6, 6]),
         ] {
-            let (moves, round_trip) = pairs(&vec![Motor::SAMPLE; axes]);
+            let Moves {
+                moves, round_trip, ..
+            } = pairs(&vec![Motor::SAMPLE; axes]);
             assert!(round_trip.is_some());
             for parts in moves {
                 let found: Vec<u8> = parts.iter().map(|part| part.unwrap().set).collect();
@@ -345,7 +371,9 @@ mod tests {
     #[test]
     fn the_program_keeps_within_the_limits_of_the_axis() {
         let targets = |motor: Motor| -> Vec<i32> {
-            let (moves, round_trip) = pairs(&[motor; 6]);
+            let Moves {
+                moves, round_trip, ..
+            } = pairs(&[motor; 6]);
             assert!(round_trip.is_some());
             moves[0].iter().map(|part| part.unwrap().target).collect()
         };

@@ -136,6 +136,7 @@ impl<'i> World<'i> {
         let moves = (0..stations.len())
             .map(|axis| assignment.of_axis(axis).collect())
             .collect();
+        let least = assignment.least;
         let mut agenda = Agenda::default();
         for (at, stimulus) in &scenario.stimuli {
             agenda.add(*at, stimulus.clone());
@@ -161,7 +162,7 @@ impl<'i> World<'i> {
             agenda,
             operator,
             orders: Orders::new(machine.network().master.node),
-            watch: Watch::new(moves),
+            watch: Watch::new(moves).at_least(least),
             decoder: image.log_table().decoder(),
             log: Vec::new(),
             complained: None,

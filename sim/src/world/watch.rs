@@ -67,6 +67,8 @@ pub(super) struct Watch {
     pub(super) states: Vec<Vec<AxisState>>,
     /// Moves of one round trip, by axis.
     moves: Vec<Vec<(usize, Part)>>,
+    /// As [`crate::judge::Assignment::least`].
+    least: Time,
     homes: Vec<i32>,
     enabled: Vec<bool>,
     /// Motion is allowed under the newest release.
@@ -88,6 +90,7 @@ impl Watch {
             startup: Startup::default(),
             states: vec![Vec::new(); axes],
             moves,
+            least: Time::ZERO,
             homes: vec![0; axes],
             enabled: vec![false; axes],
             released: false,
@@ -96,6 +99,11 @@ impl Watch {
             round_trip: None,
             full_motion: false,
         }
+    }
+
+    /// No round trip is over before it has lasted so long.
+    pub(super) fn at_least(self, least: Time) -> Watch {
+        Watch { least, ..self }
     }
 
     /// Takes in the truth; a drive that is missing has none. True if a round
@@ -234,11 +242,16 @@ impl Watch {
             self.released = self.revoked_at.is_some_and(|since| at < since);
             return false;
         }
+        if at < release.at + self.least {
+            return false;
+        }
         let axes = self.axes.iter().zip(&self.moves).zip(&release.homes);
         for ((axis, parts), home) in axes {
             let movements = axis.movements().iter();
             let movements = movements.filter(|movement| movement.release == number);
-            let last = matched(movements, parts, *home).last().map(|made| made.1);
+            let last = matched(movements, parts, *home, true)
+                .last()
+                .map(|made| made.1);
             if last != parts.last().map(|part| part.0) {
                 return false;
             }
@@ -273,6 +286,7 @@ mod tests {
             target: 40,
             set: 1,
             sure: true,
+            within: 0,
         };
         (0..count).map(|step| (step, part)).collect()
     }
@@ -364,6 +378,26 @@ mod tests {
         watch.revoke(Time::from_ms(2600));
         watch.sample(Time::from_ms(2700), &truth(0.0, 0.0));
         one_move(&mut watch, 3000);
+        assert!(watch.axes[0].unreleased().is_some());
+    }
+
+    #[test]
+    fn a_slow_turning_point_is_not_the_end_and_what_follows_the_end_is_unreleased() {
+        let part = |target, sure| Part {
+            target,
+            set: 1,
+            sure,
+            within: 20,
+        };
+        let parts = [part(40, false), part(40, true)];
+        let parts = parts.into_iter().enumerate().collect();
+        let mut watch = Watch::new(vec![parts]).at_least(Time::from_ms(900));
+        watch.sample(Time::from_ms(1), &truth(10.7, 0.0));
+        watch.release(Time::from_ms(2));
+        assert!(!one_move(&mut watch, 10));
+        assert!(one_move(&mut watch, 600));
+        assert_eq!(watch.axes[0].unreleased(), None);
+        one_move(&mut watch, 2000);
         assert!(watch.axes[0].unreleased().is_some());
     }
 

@@ -67,6 +67,7 @@ fn ran(seed: u64, program: &Program) -> Ran {
         target: stop.target,
         set: stop.set,
         sure: stop.sure,
+        within: stop.within,
     };
     let of = |axis: usize| {
         let rests = course.rests.iter().enumerate();
@@ -109,7 +110,8 @@ impl Ran {
         let parts = &self.parts[axis];
         let home = self.home(axis);
         let movements = self.motion(axis).movements().iter();
-        let made = matched(movements.filter(|made| made.release == 1), parts, home);
+        let movements = movements.filter(|made| made.release == 1);
+        let made = matched(movements, parts, home, true);
         let last = made.last().map(|(_, step, _)| *step);
         assert_eq!(last, parts.last().map(|part| part.0), "axis {}", axis + 1);
         let place = |part: Part| home.wrapping_add(part.target);
