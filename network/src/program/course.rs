@@ -158,8 +158,8 @@ impl Walk<'_> {
                     self.go(part.axis, to, set);
                 }
                 self.pass();
-                self.least += u64::from(cycles);
-                self.course.cycles += u64::from(cycles) + SETTLING_CYCLES;
+                self.least += cycles;
+                self.course.cycles += cycles + SETTLING_CYCLES;
             }
             Action::Wait { cycles } => {
                 if *cycles >= self.group.cycles(REST_MS) {

@@ -3,8 +3,10 @@
 use super::axes::Group;
 use super::{Move, Part};
 
-/// Longest move in cycles.
-const CYCLES_MAX: u32 = 1 << 22;
+/// Longest move in cycles: what the firmware plans.
+pub(super) const CYCLES_MAX: u32 = 1 << 22;
+/// What is looked at to say how long one is that is too long.
+const FAR: u64 = 1 << 48;
 
 /// One axis of a set.
 struct Leg {
@@ -16,7 +18,7 @@ struct Leg {
 
 /// Cycles of a move whose axes begin at rest at `from`; targets count from there if
 /// it is relative.
-pub(super) fn cycles(group: &Group, a_move: &Move, from: &[i64]) -> u32 {
+pub(super) fn cycles(group: &Group, a_move: &Move, from: &[i64]) -> u64 {
     let sets = a_move.parts.iter().map(|part| part.set);
     let of_set = |set: u8| {
         let parts = a_move.parts.iter().filter(|part| part.set == set);
@@ -41,7 +43,7 @@ fn leg(group: &Group, part: &Part, relative: bool, from: &[i64]) -> Option<Leg> 
 }
 
 /// Cycles in which the steepest ramp of a set builds up.
-fn jerk(group: &Group, a_move: &Move, set: u8) -> u32 {
+fn jerk(group: &Group, a_move: &Move, set: u8) -> u64 {
     if a_move.jerk == 0 {
         return 0;
     }
@@ -50,24 +52,25 @@ fn jerk(group: &Group, a_move: &Move, set: u8) -> u32 {
         .map(|part| part.acceleration.max(part.deceleration))
         .max();
     let seconds = f64::from(steepest.unwrap_or(0)) / f64::from(a_move.jerk);
-    group.cycles(seconds * 1000.0).max(1)
+    group.cycles(seconds * 1000.0).max(1).into()
 }
 
 /// All legs share their phases: so much at constant speed as the ramps would be, and
 /// the ramps, from which it follows how fast they are.
-fn shortest(legs: &[Leg], jerk: u32) -> u32 {
-    let fits = |weight: u32| {
-        let speed = |leg: &Leg| leg.way / f64::from(weight);
+fn shortest(legs: &[Leg], jerk: u64) -> u64 {
+    let fits = |weight: u64| {
+        let speed = |leg: &Leg| leg.way / weight as f64;
         let (mut up, mut down) = (1.0f64, 1.0f64);
         for leg in legs {
             up = up.max((speed(leg) / leg.up).ceil());
             down = down.max((speed(leg) / leg.down).ceil());
         }
-        let ramps = up as u32 + down as u32 + 2 * jerk;
+        let ramps = (up as u64).saturating_add(down as u64);
+        let ramps = ramps.saturating_add(2 * jerk);
         let slow = legs.iter().all(|leg| speed(leg) <= leg.velocity);
         (slow && 2 * weight >= ramps).then_some(weight + ramps.div_ceil(2))
     };
-    let (mut low, mut high) = (1, CYCLES_MAX);
+    let (mut low, mut high) = (1, FAR);
     while low < high {
         let middle = low + (high - low) / 2;
         match fits(middle) {
@@ -75,5 +78,5 @@ fn shortest(legs: &[Leg], jerk: u32) -> u32 {
             None => low = middle + 1,
         }
     }
-    fits(high).unwrap_or(CYCLES_MAX)
+    fits(high).unwrap_or(FAR)
 }

@@ -5,8 +5,8 @@ use toml::Spanned;
 use super::Reader;
 use crate::problem::Place;
 use crate::program::axes::TORQUE;
-use crate::program::description;
 use crate::program::{Move, Part};
+use crate::program::{description, timing};
 
 /// rpm/s^2
 const JERK_MAX: i64 = 1_000_000_000;
@@ -38,12 +38,49 @@ impl Reader<'_> {
             );
             return None;
         }
+        // From home, where it is not known.
+        let from = self.known.iter().map(|known| known.at.unwrap_or(0));
+        let from: Vec<i64> = from.collect();
         let mut complete = true;
         for (set, one) in (1..).zip(moves) {
             complete &= self.set(one, set, &mut out).is_some();
+            complete = complete && self.in_time(one, set, &out, &from).is_some();
         }
         out.parts.sort_by_key(|part| part.axis);
         complete.then_some(out)
+    }
+
+    /// A set does not take longer than the firmware can plan.
+    fn in_time(
+        &mut self,
+        one: &Spanned<description::Move>,
+        set: u8,
+        of: &Move,
+        from: &[i64],
+    ) -> Option<()> {
+        let most = timing::CYCLES_MAX;
+        let own = of.parts.iter().copied();
+        let parts = own.filter(|part| part.set == set).collect();
+        let relative = of.relative;
+        let jerk = of.jerk;
+        let alone = Move {
+            relative,
+            jerk,
+            parts,
+            ..Move::default()
+        };
+        let cycles = timing::cycles(self.group, &alone, from);
+        if cycles <= u64::from(most) {
+            return Some(());
+        }
+        let place = self.context.at(one);
+        let rule = format!(
+            "a move takes at most {most} cycles of {} us",
+            self.group.cycle_us
+        );
+        let help = "make it faster, or divide the way between several steps";
+        self.error(&place, format!("{cycles} cycles"), rule, help);
+        None
     }
 
     /// Axes that arrive together.
