@@ -247,6 +247,29 @@ fn what_does_not_move_has_no_rest() {
     assert_eq!(moved.rests.len(), 1);
 }
 
+/// A drive in profile position mode goes on to its next set-point during a wait; others
+/// have arrived before.
+#[test]
+fn a_wait_is_a_rest_unless_the_drive_goes_on() {
+    let group = Group::of(&sample()).unwrap();
+    let sure = |mode: &str| -> Vec<bool> {
+        let program = compiled(&format!(
+            "velocity = 1000\nacceleration = 5000\n[[step]]\n[step.mode]\nis = \"{mode}\"\n\
+             [[step]]\nsettle = false\n[[step.move]]\nto = 5000\n[[step]]\nwait_ms = 300\n\
+             [[step]]\n[[step.move]]\nto = 9000\n[[step]]\nwait_ms = 300\n\
+             [[step]]\n[[step.move]]\nto = 0\n"
+        ));
+        let course = program.course(&group);
+        course
+            .rests
+            .iter()
+            .map(|rest| rest[0].unwrap().sure)
+            .collect()
+    };
+    assert_eq!(sure("profile position"), [false, true, true]);
+    assert_eq!(sure("cyclic synchronous position"), [true; 3]);
+}
+
 #[test]
 fn a_description_names_its_program() {
     let text = std::fs::read_to_string(workspace().join("network.toml")).unwrap();

@@ -1,6 +1,6 @@
 //! What a program does to the axes: where they come to rest, and when it is done.
 
-use super::axes::{CYCLIC_TORQUE, Group};
+use super::axes::{CYCLIC_TORQUE, Group, PROFILE_POSITION};
 use super::{Action, Path, Program, Step, slow, timing};
 
 /// Between the end of a reference and the next step when nothing disturbs the axes:
@@ -70,6 +70,8 @@ struct Walk<'a> {
     modes: Vec<u8>,
     /// In this step.
     moved: Vec<Option<Stop>>,
+    /// Its drive has set-points, and goes from one to the next whatever the program does.
+    on_its_way: Vec<bool>,
     left: usize,
     /// At least so many cycles, if nothing goes on meanwhile.
     least: u64,
@@ -86,12 +88,13 @@ impl Program {
             at: vec![0; self.axes],
             modes: group.axes.iter().map(|axis| axis.mode).collect(),
             moved: vec![None; self.axes],
+            on_its_way: vec![false; self.axes],
             left: STEPS_MAX,
             least: 0,
             held: false,
         };
         walk.steps(&self.steps);
-        walk.rest();
+        walk.end();
         if walk.held || walk.course.rests.is_empty() {
             // The board's clock is not exact, and it may begin nearer.
             walk.course.least = walk.least * 9 / 10;
@@ -109,9 +112,15 @@ impl Walk<'_> {
         }
     }
 
-    /// Whoever has moved is seen to rest.
+    /// All have come to rest.
+    fn end(&mut self) {
+        self.on_its_way.fill(false);
+        self.rest();
+    }
+
+    /// Whoever has moved is seen to rest, but for drives that are on their way.
     fn rest(&mut self) {
-        for axis in 0..self.at.len() {
+        for axis in (0..self.at.len()).filter(|axis| !self.on_its_way[*axis]) {
             let mut rests = self.course.rests.iter_mut().rev();
             if let Some(last) = rests.find_map(|rest| rest[axis].as_mut()) {
                 last.sure = true;
@@ -152,6 +161,8 @@ impl Walk<'_> {
                 let mut alike = Alike::default();
                 for part in &a_move.parts {
                     let at = self.at[part.axis];
+                    let alone = self.modes[part.axis] == PROFILE_POSITION;
+                    self.on_its_way[part.axis] = alone && a_move.flying;
                     let from = if a_move.relative { at } else { 0 };
                     let to = from + i64::from(part.target);
                     let set = alike.number((part.set, (to - at).abs()));
@@ -177,7 +188,7 @@ impl Walk<'_> {
             }
             Action::Path(path) => self.path(path),
             Action::Home { axes, limit } => {
-                self.rest();
+                self.end();
                 for axis in 0..self.at.len() {
                     if axes >> axis & 1 != 0 {
                         self.at[axis] = 0;
@@ -186,7 +197,7 @@ impl Walk<'_> {
                 self.course.cycles += u64::from(*limit);
             }
             Action::Mode { axes, mode } => {
-                self.rest();
+                self.end();
                 for (axis, of) in self.modes.iter_mut().enumerate() {
                     if axes >> axis & 1 != 0 {
                         *of = *mode;
