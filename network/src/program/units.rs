@@ -43,6 +43,11 @@ impl Unit {
         Some((increments, i128::from(of_load) * i128::from(per_turn)))
     }
 
+    /// The axis has such a unit.
+    pub(super) fn is_known(self, axis: &Axis) -> bool {
+        self.factor(axis).is_some()
+    }
+
     /// The nearest increment, and what is lost by that; `None`: the axis has no such
     /// unit, or it is no position.
     pub(super) fn increments(self, axis: &Axis, value: f64) -> Option<(i64, f64)> {

@@ -70,6 +70,16 @@ impl Reader<'_> {
             let axis = self.group.axes.get(*axis)?;
             let name = axis.name.clone();
             let Some((increments, lost)) = self.unit.increments(axis, *value) else {
+                if self.unit.is_known(axis) {
+                    let (lower, upper) = axis.travel;
+                    let rule = format!(
+                        "\"{name}\" may go from {} to {} from home",
+                        self.unit.show(axis, lower.into()),
+                        self.unit.show(axis, upper.into())
+                    );
+                    self.error(place, format!("{value:e}"), rule, "write a smaller number");
+                    return None;
+                }
                 let rule = format!("\"{name}\" has no such position in the unit of the program");
                 let help = "add units_per_turn to the axis in network.toml, or use another unit";
                 self.error(place, value, rule, help);
