@@ -6,7 +6,6 @@ use canmaster::motion::mode::Mode;
 use canmaster::motion::{GroupEvent, GroupState, Reason, Refusal};
 use canmaster::sdo::Crc16;
 use canmaster_network::program::pairs;
-use proptest::prelude::*;
 
 use crate::compiled::{compiled, group};
 use crate::rig::{AXES, CYCLE_MS, READY, Rig};
@@ -577,26 +576,4 @@ fn a_path_that_is_wrong_is_named() {
     let far = vec![(u16::MAX, i32::MAX / 2, 0), (u16::MAX, i32::MAX, 0)];
     let far = shape(0, ONCE | 2, i32::MAX, &far);
     assert_eq!(of(far).0, Reason::Velocity);
-}
-
-proptest! {
-    /// Any bytes: an error or not, but no panic, neither in the check nor while
-    /// they run.
-    #[test]
-    fn any_steps_are_checked(steps in prop::collection::vec(any::<u8>(), 0..80)) {
-        let bytes = program(&[steps]);
-        if format::check(&bytes, &GROUP).is_ok() {
-            let mut rig = Rig::standby(1);
-            rig.program = bytes;
-            rig.run();
-            for _ in 0..50 {
-                rig.step(READY);
-            }
-        }
-    }
-
-    #[test]
-    fn any_bytes_are_checked(bytes in prop::collection::vec(any::<u8>(), 0..80)) {
-        let _ = format::check(&bytes, &GROUP);
-    }
 }

@@ -1,4 +1,5 @@
-//! Random programs: what the check lets pass keeps every limit in every cycle.
+//! Random programs: what the check lets pass keeps every limit in every cycle; and random
+//! bytes.
 
 use canmaster::motion::experiment::GROUP;
 use canmaster::motion::format;
@@ -147,5 +148,27 @@ proptest! {
         let ends = watched(compiled(&text).bytes(), 20_000)?;
         let (x, y) = points[points.len() - 1];
         prop_assert_eq!((ends[1], ends[4]), (x, y));
+    }
+}
+
+proptest! {
+    /// Any bytes: an error or not, but no panic, neither in the check nor while
+    /// they run.
+    #[test]
+    fn any_steps_are_checked(steps in prop::collection::vec(any::<u8>(), 0..80)) {
+        let bytes = program(&[steps]);
+        if format::check(&bytes, &GROUP).is_ok() {
+            let mut rig = Rig::standby(1);
+            rig.program = bytes;
+            rig.run();
+            for _ in 0..50 {
+                rig.step(READY);
+            }
+        }
+    }
+
+    #[test]
+    fn any_bytes_are_checked(bytes in prop::collection::vec(any::<u8>(), 0..80)) {
+        let _ = format::check(&bytes, &GROUP);
     }
 }
