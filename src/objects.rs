@@ -54,6 +54,8 @@ pub const MODES_OF_OPERATION_DISPLAY: Address = Address::new(0x6061, 0);
 pub const POSITION_ACTUAL: Address = Address::new(0x6064, 0);
 /// Velocity actual value (CiA 402), I32 in velocity units.
 pub const VELOCITY_ACTUAL: Address = Address::new(0x606C, 0);
+/// Profile velocity (CiA 402), U32 in velocity units: of a set-point in profile position mode.
+pub const PROFILE_VELOCITY: Address = Address::new(0x6081, 0);
 /// Target torque (CiA 402), I16 in per mille of the rated torque.
 pub const TARGET_TORQUE: Address = Address::new(0x6071, 0);
 /// Torque actual value (CiA 402), I16 in per mille of the rated torque.

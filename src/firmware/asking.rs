@@ -31,12 +31,13 @@ const ASKS: bool = {
     asks
 };
 
-/// A request of one frame, with a value of one byte.
-pub(crate) fn request(command: u8, at: Address, node: NodeId, value: u8) -> Frame {
+/// A request of one frame, with a value of up to four bytes.
+pub(crate) fn request(command: u8, at: Address, node: NodeId, value: u32) -> Frame {
     let [low, high] = at.index.0.to_le_bytes();
+    let [a, b, c, d] = value.to_le_bytes();
     Frame::full(
         CobId::of(FunctionCode::SdoRequest, node),
-        [command, low, high, at.sub.0, value, 0, 0, 0],
+        [command, low, high, at.sub.0, a, b, c, d],
     )
 }
 

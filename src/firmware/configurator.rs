@@ -7,9 +7,9 @@ use crate::{
     duties::Silent,
     lines::SYNCS,
     log::{self, Log, News},
-    modes::Modes,
     own_node::{OwnNode, Storage},
     roll::{self, Task},
+    settings::Settings,
     transfer::{self, Transfer},
     wake,
 };
@@ -58,7 +58,7 @@ pub(crate) struct Configurator<'a> {
     pub(crate) log: Log,
     silent: Silent,
     transfer: Option<Transfer>,
-    modes: Modes,
+    settings: Settings,
     /// SYNCs that the device was told of.
     syncs: u32,
 }
@@ -80,7 +80,7 @@ impl<'a> Configurator<'a> {
             log: Log::new(NETWORK),
             silent: Silent::default(),
             transfer: None,
-            modes: Modes::NONE,
+            settings: Settings::NONE,
             syncs: 0,
         };
         for setting in [
@@ -120,7 +120,7 @@ impl<'a> Configurator<'a> {
         // A board that is stopped has neither SDO nor SYNC: the boot-up waits.
         let held = self.local.own.device.state() == State::Stopped && !bus_off;
         self.boot(held);
-        self.change_modes();
+        self.set();
         roll::check_in(Task::SdoConfigurator);
         let boots = self.local.boot.next_deadline().filter(|_| !held);
         let mut next = self.now() + design::CONFIGURATOR_PERIOD;
@@ -213,24 +213,23 @@ impl<'a> Configurator<'a> {
             // It leaves the answers of SDO servers alone.
             self.local.own.error_control(&frame);
             let now = self.now();
-            if !self.modes.on_frame(&frame, now) {
+            if !self.settings.on_frame(&frame, now) {
                 self.local.boot.on_frame(&frame, now);
             }
         }
     }
 
-    /// Writes 6060h where the group wants another mode of operation, and tells it when
-    /// 6061h shows it.
-    fn change_modes(&mut self) {
-        let confirmed = self.modes.take_confirmed();
+    /// Writes to a drive what the group wants it to show, and tells it when it does.
+    fn set(&mut self) {
+        let shown = self.settings.take_shown();
         let wanted = self.shared.axes.lock(|axes| {
-            if let Some(confirmed) = confirmed {
-                axes.group.confirm_mode(confirmed);
+            if let Some(shown) = shown {
+                axes.group.confirm(shown);
             }
-            axes.group.mode_wanted()
+            axes.group.wanted()
         });
         let now = self.now();
-        if let Some(frame) = self.modes.poll(wanted, now) {
+        if let Some(frame) = self.settings.poll(wanted, now) {
             self.send(frame);
         }
     }

@@ -33,8 +33,6 @@ mod log;
 #[cfg(target_os = "none")]
 mod measured;
 #[cfg(target_os = "none")]
-mod modes;
-#[cfg(target_os = "none")]
 mod own_node;
 #[cfg(target_os = "none")]
 mod reception;
@@ -42,6 +40,8 @@ mod reception;
 mod report;
 #[cfg(target_os = "none")]
 mod roll;
+#[cfg(target_os = "none")]
+mod settings;
 #[cfg(target_os = "none")]
 mod transfer;
 #[cfg(target_os = "none")]

@@ -44,7 +44,8 @@ pub use config::{AxisConfig, GroupConfig};
 pub use director::{Director, format};
 pub use event::{Cause, FaultCause, GroupEvent, GroupState};
 pub use group::{
-    AxisCommand, AxisFeedback, AxisView, Group, Inputs, ModeWanted, Order, SetPoint, TooLate,
+    AxisCommand, AxisFeedback, AxisView, DriveSetting, Group, Inputs, Order, SetPoint, TooLate,
+    Wanted,
 };
 pub use position_control::{PositionControl, Tuning, Window};
 pub use program::{AxisMove, Reason, Refusal};

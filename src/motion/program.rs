@@ -86,6 +86,9 @@ pub enum Reason {
     Torque,
     /// Cycles of a move, a wait or a search for home.
     Time,
+    /// Velocity in rpm that the drive does not show in 6081h; what it showed before is not
+    /// known any more.
+    NotShown,
 }
 
 impl Reason {
@@ -135,6 +138,7 @@ in_words!(Reason by Reason::place {
     Reason::Target => ("target in increments from home"),
     Reason::Torque => ("torque in per mille"),
     Reason::Time => ("time in cycles"),
+    Reason::NotShown => ("velocity in rpm, which 6081h does not come to,"),
 });
 
 /// A [`Refusal`] says why: it stays in its place, which is shorter than to hand it on.

@@ -14,5 +14,6 @@ mod plant;
 mod programs;
 mod random;
 mod rig;
+mod set_points;
 mod stops;
 mod table;

@@ -67,8 +67,11 @@ pub(crate) struct Drive {
     over: f64,
     /// Where a move of the drive itself goes; `None`: there is none.
     going: Option<f64>,
-    /// The last set-point.
+    /// The last set-point, and how fast and with which ramps it goes there.
     aimed: i64,
+    profile: (f64, u32, u32),
+    /// 6081h, rpm.
+    pub(crate) profile_velocity: f64,
     /// Bit 12 in modes that the drive leads.
     answered: bool,
     /// It never answers set-points, and does not find its home.
@@ -108,6 +111,8 @@ impl Drive {
             over: 0.0,
             going: None,
             aimed: 0,
+            profile: (0.0, 1, 1),
+            profile_velocity: 1000.0,
             answered: false,
             deaf: false,
             homeless: false,
@@ -185,6 +190,12 @@ impl Drive {
                 }
                 self.aimed += i64::from(self.target.target);
                 self.going = Some(self.aimed as f64);
+                let AxisCommand {
+                    acceleration,
+                    deceleration,
+                    ..
+                } = self.target;
+                self.profile = (self.profile_velocity, acceleration, deceleration);
             }
             self.answered = begin;
         }
@@ -263,11 +274,14 @@ impl Drive {
                 // With halt it brakes, and goes on afterwards.
                 let going = self.going.filter(|_| !self.word.halt());
                 let left = going.map_or(0.0, |to| to - self.position);
-                let speed =
-                    (2.0 * left.abs() / PER_RPM * f64::from(self.target.deceleration) * 0.5)
-                        .sqrt()
-                        .min(500.0);
-                self.ramp(speed.copysign(left));
+                let (fastest, up, down) = match going {
+                    Some(_) => self.profile,
+                    None => (0.0, self.target.acceleration, self.target.deceleration),
+                };
+                let speed = (2.0 * left.abs() / PER_RPM * f64::from(down) * 0.5)
+                    .sqrt()
+                    .min(fastest);
+                self.ramp_by(speed.copysign(left), up, down);
                 if going.is_some() && left.abs() < 2.0 && self.velocity.abs() < 5.0 {
                     self.going = None;
                 }
@@ -278,12 +292,12 @@ impl Drive {
 
     /// 6083h while the speed grows, 6084h while it shrinks.
     fn ramp(&mut self, wanted: f64) {
+        self.ramp_by(wanted, self.target.acceleration, self.target.deceleration);
+    }
+
+    fn ramp_by(&mut self, wanted: f64, up: u32, down: u32) {
         let slowing = self.demand * wanted < 0.0 || wanted.abs() < self.demand.abs();
-        let slope = if slowing {
-            self.target.deceleration
-        } else {
-            self.target.acceleration
-        };
+        let slope = if slowing { down } else { up };
         let most = f64::from(slope) * STEP_S;
         self.demand += (wanted - self.demand).clamp(-most, most);
     }

@@ -3,7 +3,7 @@
 use canmaster::cia402::State;
 use canmaster::motion::experiment::GROUP;
 use canmaster::motion::mode::Mode;
-use canmaster::motion::{AxisCommand, Group, Inputs, Order};
+use canmaster::motion::{AxisCommand, DriveSetting, Group, Inputs, Order};
 use canmaster::motion::{AxisFeedback, AxisMove, Director, GroupEvent, GroupState};
 
 use crate::plant::{Drive, STEPS};
@@ -123,12 +123,12 @@ impl Rig {
         assert!(came, "{state} is not reached: {}", self.last());
     }
 
-    /// Steps until all have arrived.
+    /// Steps until all have arrived, and nothing is planned any more.
     pub(crate) fn arrive(&mut self, cycles: u32) {
         self.step(READY);
         let came = (0..cycles).any(|_| {
             self.step(READY);
-            self.group.all_arrived()
+            self.director.patience() == 0 && self.group.all_arrived()
         });
         assert!(came, "{}", self.last());
     }
@@ -148,10 +148,14 @@ impl Rig {
             self.notices.push(event);
         }
         if self.confirms
-            && let Some(wanted) = self.group.mode_wanted()
+            && let Some(wanted) = self.group.wanted()
         {
-            self.drives[wanted.axis].set_mode(wanted.mode);
-            self.group.confirm_mode(wanted);
+            let drive = &mut self.drives[wanted.axis];
+            match wanted.setting {
+                DriveSetting::Mode(mode) => drive.set_mode(mode),
+                DriveSetting::ProfileVelocity(rpm) => drive.profile_velocity = rpm.into(),
+            }
+            self.group.confirm(wanted);
         }
         for (drive, command) in self.drives.iter_mut().zip(&self.commands) {
             drive.receive(*command);

@@ -65,6 +65,43 @@ fn axes_arrive_in_every_mode_that_has_a_position() {
     }
 }
 
+/// The drive makes the motion by itself, with the velocity and the ramps of the move.
+#[test]
+fn in_profile_position_a_drive_moves_as_it_is_told() {
+    const RAMP: f64 = 800.0;
+    let velocity = |n: usize| 400.0 + 100.0 * n as f64;
+    let mut client = in_standby(97);
+    set_modes(&mut client, ALL, Mode::ProfilePosition as u8);
+    emergencies(&mut client);
+    put_targets(&mut client, 60_000);
+    for (n, axis) in (1..=AXES).enumerate() {
+        let put = |client: &mut Client<'_>, index, value: f64| {
+            client.put(index, axis, value as u32, 4).unwrap();
+        };
+        put(&mut client, panel::VELOCITY, velocity(n));
+        put(&mut client, panel::ACCELERATION, RAMP);
+    }
+    start(&mut client);
+    let (mut fastest, mut steepest) = ([0.0f64; AXES as usize], [0.0f64; AXES as usize]);
+    let mut before = [0.0; AXES as usize];
+    for _ in 0..25 {
+        client.listen(Time::from_ms(100));
+        for (n, truth) in client.world.truths().flatten().enumerate() {
+            let speed = truth.velocity_rpm;
+            fastest[n] = fastest[n].max(speed);
+            steepest[n] = steepest[n].max((speed - before[n]) / 0.1);
+            before[n] = speed;
+        }
+    }
+    for (n, (fastest, steepest)) in fastest.into_iter().zip(steepest).enumerate() {
+        let off = fastest - velocity(n);
+        assert!(off.abs() < 30.0, "axis {}: {off} rpm beside it", n + 1);
+        let off = steepest - RAMP;
+        assert!(off.abs() < 100.0, "axis {}: {off} rpm/s beside it", n + 1);
+    }
+    assert_eq!(emergencies(&mut client), []);
+}
+
 /// The axes stay where a stop has brought them to rest, in standby and when they are
 /// released again.
 #[test]

@@ -82,11 +82,16 @@ impl<const N: usize> Director<N> {
     }
 
     /// Where the paths will stand when the plan begins, and who gets a set-point; `false`
-    /// if a drive has not taken its last one yet.
+    /// if a drive has not taken its last one yet, or not what the next one needs.
     #[inline(never)]
-    pub(super) fn predict(&mut self, group: &Group<N>, step: &Step<'_>) -> Result<bool, Refused> {
+    pub(super) fn predict(
+        &mut self,
+        group: &mut Group<N>,
+        step: &Step<'_>,
+    ) -> Result<bool, Refused> {
         let lead = LEAD + self.later;
         self.start = group.count().wrapping_add(lead);
+        let patience = self.config.map_or(0, |of| of.cycles(of.enable_timeout));
         for (axis, leg) in self.legs.iter_mut().enumerate() {
             let Some(of) = group.axis(axis) else {
                 break;
@@ -102,12 +107,25 @@ impl<const N: usize> Director<N> {
                     self.error.because(Reason::Mode, mode, allowed)?;
                 }
             } else if mode == Mode::ProfilePosition {
-                if leg.set.take().is_some() {
-                    self.set_points |= 1 << axis;
-                    (leg.up, leg.down) = (leg.acceleration, leg.deceleration);
+                let new = leg.set.take().is_some();
+                self.set_points |= u32::from(new) << axis;
+                if self.set_points >> axis & 1 == 0 {
+                    continue;
                 }
-                if self.set_points >> axis & 1 != 0 && !of.takes_set_points() {
+                let takes = of.takes_set_points();
+                if new || !takes {
+                    self.until = self.start.wrapping_add(patience);
+                }
+                if !takes {
                     return Ok(false);
+                }
+                let [up, down] = [leg.acceleration, leg.deceleration];
+                if let Err(rpm) = group.prepare(axis, leg.velocity, up, down) {
+                    if (self.start.wrapping_sub(self.until) as i32) < 0 {
+                        return Ok(false);
+                    }
+                    self.error.axis = axis as u8;
+                    self.error.because(Reason::NotShown, rpm, 0)?;
                 }
             }
         }
@@ -186,7 +204,6 @@ impl<const N: usize> Director<N> {
             if (axes | set_points) >> axis & 1 == 0 {
                 continue;
             }
-            group.set_ramps(axis, leg.up, leg.down);
             if set_points >> axis & 1 != 0 {
                 let set_point = SetPoint {
                     target: leg.target,
@@ -196,7 +213,10 @@ impl<const N: usize> Director<N> {
                 };
                 // It can take one, as the prediction has found.
                 group.ask(axis, &set_point);
-            } else if !self.path {
+                continue;
+            }
+            group.set_ramps(axis, leg.up, leg.down);
+            if !self.path {
                 for knot in &leg.knots {
                     group.push(axis, knot);
                 }

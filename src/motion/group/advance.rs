@@ -4,7 +4,7 @@ use super::axis::{
     AT_REST, Axis, BY_DRIVE, BY_POSITION, ENABLED, ENDED, PASSING, PLACED, REACHED, SILENT, SLOW,
     STOP_MIN,
 };
-use super::{Group, ModeWanted, bit};
+use super::{DriveSetting, Group, Wanted, bit};
 use crate::cia402::Goal;
 use crate::motion::contract::{Cell, Event, cell};
 use crate::motion::mode::Mode;
@@ -31,6 +31,7 @@ impl<const N: usize> Group<N> {
         // What came to rest before does not count.
         for axis in &mut self.axes {
             axis.seen &= !PASSING;
+            axis.forget_speed();
         }
         match to {
             GroupState::Enabling => {
@@ -80,12 +81,16 @@ impl<const N: usize> Group<N> {
         const PERCENT: f32 = 0.01;
         let more = config.ramp_percent as f32 * PERCENT;
         let least = config.ramp_min as f32;
+        // Of a drive that halts by itself.
+        let own = config.stop_deceleration as f32;
         let axes = self.axes.iter_mut().zip(&config.axes).zip(speeds);
         for ((axis, config), speed) in axes {
             let slope = axis.stop(cycles, speed, config);
             if axis.seen & BY_POSITION != 0 {
                 let ramp = greater(config.scale.rpm_per_s(slope) * more, least);
                 axis.set_ramps(ramp, ramp);
+            } else if axis.seen & BY_DRIVE != 0 {
+                axis.set_ramps(own, own);
             }
         }
     }
@@ -129,7 +134,11 @@ impl<const N: usize> Group<N> {
     /// Whether 6061h of every axis has shown its mode.
     #[inline(never)]
     fn knows_modes(&mut self, config: &GroupConfig<N>) -> bool {
-        let Some(ModeWanted { axis, mode }) = self.next_wanted() else {
+        let Some(Wanted {
+            axis,
+            setting: DriveSetting::Mode(mode),
+        }) = self.next_wanted()
+        else {
             return true;
         };
         if self.since > config.cycles(config.enable_timeout) {

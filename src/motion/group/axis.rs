@@ -1,12 +1,13 @@
 //! One axis of the group: what is commanded to its drive, cycle by cycle.
 
-use super::AxisCommand;
 use super::drive_led::DriveLed;
+use super::{AxisCommand, DriveSetting};
 use crate::cia402::{self, Command, ControlWord, State, StatusWord};
 use crate::motion::fixed;
 use crate::motion::mode::Mode;
 use crate::motion::path::{Path, Point, Sample};
 use crate::motion::position_control::{PositionControl, Tuning, Window};
+use crate::motion::scale::Scale;
 use crate::motion::{AxisConfig, AxisFeedback, GroupConfig};
 
 /// SYNCs that the path is ahead of the last sampled position: the next command
@@ -101,9 +102,13 @@ pub(in crate::motion) struct Axis {
     pub(in crate::motion) home: i32,
     /// What was commanded last.
     target: i32,
-    /// 6083h and 6084h, rpm/s.
+    /// 6083h and 6084h, rpm/s, and since which step they are these for a set-point.
     up: u32,
     down: u32,
+    ramped: u32,
+    /// 6081h, rpm: as its drive has shown it, and as it is to be; 0: unknown.
+    speed: u32,
+    speed_wanted: u32,
     control: PositionControl,
     /// What its drive reported in this cycle.
     pub(in crate::motion) feedback: AxisFeedback,
@@ -138,6 +143,9 @@ impl Axis {
         target: 0,
         up: 0,
         down: 0,
+        ramped: 0,
+        speed: 0,
+        speed_wanted: 0,
     };
 
     /// Forgets what was asked of the drive, before enabling. A change of its mode that
@@ -150,6 +158,7 @@ impl Axis {
         self.missing = 0;
         self.seen &= !(HEARD | ENABLED);
         self.led = DriveLed::new();
+        (self.speed, self.speed_wanted) = (0, 0);
     }
 
     pub(in crate::motion) fn mode(&self) -> Mode {
@@ -315,6 +324,57 @@ impl Axis {
     pub(super) fn set_ramps(&mut self, up: f32, down: f32) {
         self.up = up as u32;
         self.down = down as u32;
+    }
+
+    /// The same, exactly as a set-point needs them, and its velocity. An error until the drive
+    /// has all of it: RPDO2 goes to one of `axes` in a cycle, 6081h is asked for.
+    pub(super) fn prepare(
+        &mut self,
+        scale: Scale,
+        velocity: f32,
+        up: f32,
+        down: f32,
+        axes: u32,
+    ) -> Result<(), u32> {
+        const HALF: f32 = 0.5;
+        let [up, down, speed] = [
+            scale.rpm_per_s(up),
+            scale.rpm_per_s(down),
+            scale.rpm(velocity),
+        ]
+        .map(|value| (value + HALF) as u32);
+        if (self.up, self.down) != (up, down) {
+            (self.up, self.down, self.ramped) = (up, down, self.count);
+        }
+        self.speed_wanted = speed;
+        if self.speed != speed {
+            // It may be written from now on.
+            self.speed = 0;
+        }
+        let has = self.speed == speed && self.count.wrapping_sub(self.ramped) > axes;
+        if has { Ok(()) } else { Err(speed) }
+    }
+
+    /// Its drive shows this in 6081h.
+    pub(super) fn show_speed(&mut self, rpm: u32) {
+        if self.speed_wanted == rpm {
+            self.speed = rpm;
+        }
+    }
+
+    /// Nothing is asked for any more.
+    pub(super) fn forget_speed(&mut self) {
+        self.speed_wanted = self.speed;
+    }
+
+    /// What its drive is to show, and does not yet.
+    pub(super) fn setting_wanted(&self) -> Option<DriveSetting> {
+        let rpm = self.speed_wanted;
+        match self.wanted {
+            Some(mode) => Some(DriveSetting::Mode(mode)),
+            None if rpm != self.speed => Some(DriveSetting::ProfileVelocity(rpm)),
+            None => None,
+        }
     }
 
     /// Speed from which a stop begins, rpm: of the reference, after a fault of

@@ -95,11 +95,20 @@ pub struct AxisView {
     pub faulted: bool,
 }
 
-/// An axis whose mode is to be written to 6060h and confirmed in 6061h.
+/// What a drive is to have, and is asked for until it shows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ModeWanted {
+pub enum DriveSetting {
+    /// To be written to 6060h and shown in 6061h.
+    Mode(Mode),
+    /// Of the next set-point, rpm: to be written to 6081h and shown there.
+    ProfileVelocity(u32),
+}
+
+/// An axis whose drive is to be written to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Wanted {
     /// Counted from 0.
     pub axis: usize,
-    /// What to write.
-    pub mode: Mode,
+    /// What.
+    pub setting: DriveSetting,
 }

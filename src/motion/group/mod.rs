@@ -14,13 +14,13 @@ mod order;
 mod watch;
 
 pub use drive_led::SetPoint;
-pub use exchange::{AxisCommand, AxisFeedback, AxisView, Inputs, ModeWanted};
+pub use exchange::{AxisCommand, AxisFeedback, AxisView, DriveSetting, Inputs, Wanted};
 pub use order::Order;
 
 use self::axis::{Axes, Axis, BY_DRIVE, HEARD, Lead, REACHED, Seen};
 use super::mode::Mode;
 use super::path::{Knot, Point};
-use super::{GroupConfig, GroupEvent, GroupState, fixed, greater};
+use super::{GroupConfig, GroupEvent, GroupState, fixed, greater, next};
 use crate::cia402::{Command, ControlWord, Goal};
 use crate::time::{Duration, Instant};
 use heapless::Deque;
@@ -307,6 +307,25 @@ impl<const N: usize> Group<N> {
         of.set_ramps(ramp(up), ramp(down));
     }
 
+    /// What the next set-point of an axis needs of its drive: its highest velocity and its
+    /// ramps, in increments and cycles. An error until the drive has them: the velocity in
+    /// rpm.
+    pub(super) fn prepare(
+        &mut self,
+        axis: usize,
+        velocity: f32,
+        up: f32,
+        down: f32,
+    ) -> Result<(), u32> {
+        let (Some(config), Some(of)) = (self.config, self.axes.get_mut(axis)) else {
+            return Ok(());
+        };
+        let Some(limits) = config.axes.get(axis) else {
+            return Ok(());
+        };
+        of.prepare(limits.scale, velocity, up, down, N as u32)
+    }
+
     /// A set-point of profile position mode, to be handed to the drive. `false`:
     /// the drive has not taken the last one yet, or the group is not released, or
     /// the axis is in another mode.
@@ -339,32 +358,40 @@ impl<const N: usize> Group<N> {
         self.announced == 0 && self.axes.iter().all(|axis| axis.path.is_over())
     }
 
-    /// The next axis whose mode has to be written and confirmed.
-    pub fn mode_wanted(&self) -> Option<ModeWanted> {
-        let changes = matches!(self.state, GroupState::ModeChange | GroupState::Enabling);
-        if !changes || self.since < TARGET_SETTLED {
-            return None;
+    /// The next axis whose drive is to be written to, and what it has to show then.
+    pub fn wanted(&self) -> Option<Wanted> {
+        match self.state {
+            GroupState::Moving => {}
+            GroupState::ModeChange | GroupState::Enabling if self.since >= TARGET_SETTLED => {}
+            _ => return None,
         }
         self.next_wanted()
     }
 
-    fn next_wanted(&self) -> Option<ModeWanted> {
-        let here = self.here();
-        let wanted = |(axis, a): (usize, &Axis)| {
-            let mode = a.wanted.filter(|_| here & bit(axis) != 0)?;
-            Some(ModeWanted { axis, mode })
-        };
-        self.axes.iter().enumerate().find_map(wanted)
+    fn next_wanted(&self) -> Option<Wanted> {
+        let mut look = self.here();
+        while let Some(axis) = next(&mut look) {
+            if let Some(setting) = self.axes.get(axis)?.setting_wanted() {
+                return Some(Wanted { axis, setting });
+            }
+        }
+        None
     }
 
-    /// 6061h of an axis shows `mode`.
-    pub fn confirm_mode(&mut self, confirmed: ModeWanted) {
-        if let Some(axis) = self.axes.get_mut(confirmed.axis)
-            && axis.wanted == Some(confirmed.mode)
-        {
-            axis.wanted = None;
-            axis.take_mode(confirmed.mode);
-            axis.hold_actual();
+    /// The drive of an axis shows what was wanted.
+    pub fn confirm(&mut self, shown: Wanted) {
+        let Some(axis) = self.axes.get_mut(shown.axis) else {
+            return;
+        };
+        match shown.setting {
+            DriveSetting::Mode(mode) if axis.wanted == Some(mode) => {
+                axis.wanted = None;
+                axis.take_mode(mode);
+                axis.hold_actual();
+                self.set_ramps(shown.axis, 0.0, 0.0);
+            }
+            DriveSetting::ProfileVelocity(rpm) => axis.show_speed(rpm),
+            DriveSetting::Mode(_) => {}
         }
     }
 
