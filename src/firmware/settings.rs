@@ -47,28 +47,19 @@ impl Settings {
     };
 
     /// What a drive has come to show, once.
-    pub(crate) fn take_shown(&mut self) -> Option<Wanted> {
+    pub(crate) fn take_shown(&mut self) -> Option<&Wanted> {
         let shown = core::mem::take(&mut self.shown);
-        self.wanted.filter(|_| shown)
+        self.wanted.as_ref().filter(|_| shown)
     }
 
-    /// Where it is written or read, the request to write it, and its value.
-    fn access(&self, setting: DriveSetting) -> (Address, u8, u32) {
-        let (command, at, value, shown) = match setting {
-            DriveSetting::Mode(mode) => (
-                DOWNLOAD_U8,
-                objects::MODES_OF_OPERATION,
-                (mode.code() as u8).into(),
-                objects::MODES_OF_OPERATION_DISPLAY,
-            ),
-            DriveSetting::ProfileVelocity(rpm) => (
-                DOWNLOAD_U32,
-                objects::PROFILE_VELOCITY,
-                rpm,
-                objects::PROFILE_VELOCITY,
-            ),
-        };
-        (if self.written { shown } else { at }, command, value)
+    /// Where it is written or read, and the request to write it.
+    #[inline(never)]
+    fn access(&self, setting: DriveSetting) -> (Address, u8) {
+        match (setting, self.written) {
+            (DriveSetting::Mode, false) => (objects::MODES_OF_OPERATION, DOWNLOAD_U8),
+            (DriveSetting::Mode, true) => (objects::MODES_OF_OPERATION_DISPLAY, DOWNLOAD_U8),
+            (DriveSetting::ProfileVelocity, _) => (objects::PROFILE_VELOCITY, DOWNLOAD_U32),
+        }
     }
 
     /// What is to be sent for what the group wants.
@@ -80,21 +71,21 @@ impl Settings {
         }
         let wanted = wanted.filter(|_| now >= self.next)?;
         self.next = now + REPEAT;
-        let (at, mut command, value) = self.access(wanted.setting);
+        let (at, mut command) = self.access(wanted.setting);
         if self.written {
             command = UPLOAD;
         }
-        Some(asking::request(command, at, node(wanted)?, value))
+        Some(asking::request(command, at, node(&wanted)?, wanted.value))
     }
 
     /// Takes in an answer; `false` if it is somebody else's.
     pub(crate) fn on_frame(&mut self, frame: &Frame, now: Instant) -> bool {
-        let Some(wanted) = self.wanted else {
+        let Some(wanted) = &self.wanted else {
             return false;
         };
         let answers = |node| CobId::of(FunctionCode::SdoResponse, node) == frame.id();
         let [command, low, high, sub, value @ ..] = frame.padded();
-        let (at, written, expected) = self.access(wanted.setting);
+        let (at, written) = self.access(wanted.setting);
         if !node(wanted).is_some_and(answers)
             || [low, high] != at.index.0.to_le_bytes()
             || sub != at.sub.0
@@ -109,7 +100,7 @@ impl Settings {
             _ if command & UPLOADED_MASK == UPLOADED => {
                 // Bytes beyond those of the object mean nothing.
                 let beyond = u32::from(written >> 2 & 3) * u8::BITS;
-                self.shown = (u32::from_le_bytes(value) ^ expected) << beyond == 0;
+                self.shown = (u32::from_le_bytes(value) ^ wanted.value) << beyond == 0;
                 self.next = now + POLL;
             }
             // It is tried again.
@@ -119,6 +110,6 @@ impl Settings {
     }
 }
 
-fn node(wanted: Wanted) -> Option<NodeId> {
+fn node(wanted: &Wanted) -> Option<NodeId> {
     NETWORK.nodes.get(wanted.axis).map(|node| node.id)
 }

@@ -20,6 +20,13 @@ pub struct Scale {
 }
 
 impl Scale {
+    /// Values stay what they are, for a drive that is told them.
+    pub const NONE: Scale = Scale {
+        per_rpm: 1.0,
+        rpm: 1.0,
+        cycles_per_second: 1.0,
+    };
+
     /// The factors for an encoder of `increments_per_turn` and a cycle.
     pub const fn new(increments_per_turn: u32, cycle: Duration) -> Scale {
         let cycle_s = cycle.as_micros() as f32 / SECOND_US;

@@ -152,10 +152,10 @@ impl Rig {
         {
             let drive = &mut self.drives[wanted.axis];
             match wanted.setting {
-                DriveSetting::Mode(mode) => drive.set_mode(mode),
-                DriveSetting::ProfileVelocity(rpm) => drive.profile_velocity = rpm.into(),
+                DriveSetting::Mode => drive.set_mode(Mode::of(wanted.value as i8).unwrap()),
+                DriveSetting::ProfileVelocity => drive.profile_velocity = wanted.value.into(),
             }
-            self.group.confirm(wanted);
+            self.group.confirm(&wanted);
         }
         for (drive, command) in self.drives.iter_mut().zip(&self.commands) {
             drive.receive(*command);

@@ -2,6 +2,7 @@
 
 use super::format::{RELATIVE, Step};
 use super::{Director, LATER_MAX, LEAD, Phase, format};
+use crate::motion::Scale;
 use crate::motion::group::{Group, SetPoint};
 use crate::motion::mode::Mode;
 use crate::motion::program::{AxisMove, Judged, Reason, Refusal, Refused, TORQUE};
@@ -9,6 +10,8 @@ use crate::motion::{fixed, next, plan};
 
 /// Points of a path that are handed over in one look, since the group waits.
 const POINTS: usize = 2;
+/// Cycles in which a drive shows the velocity of its next set-point.
+const PATIENCE: u32 = 1000;
 
 impl<const N: usize> Director<N> {
     pub(super) fn clear(&mut self) {
@@ -62,11 +65,15 @@ impl<const N: usize> Director<N> {
             };
             return why.because(Reason::WrongMode, mode as u32, allowed as u32);
         }
-        let (home, scale) = if torque {
-            (0, limits.scale.of_units())
-        } else {
-            (of.home, limits.scale)
-        };
+        let mut home = of.home;
+        let mut scale = limits.scale;
+        if torque {
+            home = 0;
+            scale = scale.of_units();
+        } else if mode == Mode::ProfilePosition {
+            scale = Scale::NONE;
+            self.until = group.count().wrapping_add(PATIENCE);
+        }
         let mut target = part.target;
         if relative {
             let end = fixed::round(of.path.end());
@@ -91,9 +98,9 @@ impl<const N: usize> Director<N> {
     ) -> Result<bool, Refused> {
         let lead = LEAD + self.later;
         self.start = group.count().wrapping_add(lead);
-        let patience = self.config.map_or(0, |of| of.cycles(of.enable_timeout));
+        let mut ready = true;
         for (axis, leg) in self.legs.iter_mut().enumerate() {
-            let Some(of) = group.axis(axis) else {
+            let Some(of) = group.axis_mut(axis) else {
                 break;
             };
             let mode = of.mode();
@@ -107,29 +114,30 @@ impl<const N: usize> Director<N> {
                     self.error.because(Reason::Mode, mode, allowed)?;
                 }
             } else if mode == Mode::ProfilePosition {
-                let new = leg.set.take().is_some();
-                self.set_points |= u32::from(new) << axis;
+                if leg.set.take().is_some() {
+                    self.set_points |= 1 << axis;
+                }
                 if self.set_points >> axis & 1 == 0 {
                     continue;
                 }
-                let takes = of.takes_set_points();
-                if new || !takes {
-                    self.until = self.start.wrapping_add(patience);
+                if !of.takes_set_points() {
+                    self.until = self.start.wrapping_add(PATIENCE);
+                    ready = false;
+                    continue;
                 }
-                if !takes {
-                    return Ok(false);
-                }
-                let [up, down] = [leg.acceleration, leg.deceleration];
-                if let Err(rpm) = group.prepare(axis, leg.velocity, up, down) {
-                    if (self.start.wrapping_sub(self.until) as i32) < 0 {
-                        return Ok(false);
+                // Its drive counts as people do.
+                let profile = [leg.velocity, leg.acceleration, leg.deceleration];
+                let profile = profile.map(|value| value as u32);
+                if !of.prepare(profile, N as u32) {
+                    ready = false;
+                    if self.start.wrapping_sub(self.until) as i32 >= 0 {
+                        self.error.axis = axis as u8;
+                        self.error.because(Reason::NotShown, profile[0], 0)?;
                     }
-                    self.error.axis = axis as u8;
-                    self.error.because(Reason::NotShown, rpm, 0)?;
                 }
             }
         }
-        Ok(true)
+        Ok(ready)
     }
 
     /// Plans what there is to plan, and checks it against the travel from where the

@@ -4,7 +4,7 @@ use super::axis::{
     AT_REST, Axis, BY_DRIVE, BY_POSITION, ENABLED, ENDED, PASSING, PLACED, REACHED, SILENT, SLOW,
     STOP_MIN,
 };
-use super::{DriveSetting, Group, Wanted, bit};
+use super::{Group, Wanted, bit};
 use crate::cia402::Goal;
 use crate::motion::contract::{Cell, Event, cell};
 use crate::motion::mode::Mode;
@@ -86,12 +86,14 @@ impl<const N: usize> Group<N> {
         let axes = self.axes.iter_mut().zip(&config.axes).zip(speeds);
         for ((axis, config), speed) in axes {
             let slope = axis.stop(cycles, speed, config);
-            if axis.seen & BY_POSITION != 0 {
-                let ramp = greater(config.scale.rpm_per_s(slope) * more, least);
-                axis.set_ramps(ramp, ramp);
+            let ramp = if axis.seen & BY_POSITION != 0 {
+                greater(config.scale.rpm_per_s(slope) * more, least)
             } else if axis.seen & BY_DRIVE != 0 {
-                axis.set_ramps(own, own);
-            }
+                own
+            } else {
+                continue;
+            };
+            axis.set_ramps(ramp, ramp);
         }
     }
 
@@ -134,15 +136,12 @@ impl<const N: usize> Group<N> {
     /// Whether 6061h of every axis has shown its mode.
     #[inline(never)]
     fn knows_modes(&mut self, config: &GroupConfig<N>) -> bool {
-        let Some(Wanted {
-            axis,
-            setting: DriveSetting::Mode(mode),
-        }) = self.next_wanted()
-        else {
+        // No velocity is asked for in this state.
+        let Some(Wanted { axis, value, .. }) = self.next_wanted() else {
             return true;
         };
         if self.since > config.cycles(config.enable_timeout) {
-            let cause = Cause::ModeNotConfirmed.with(mode as i32);
+            let cause = Cause::ModeNotConfirmed.with(value as i32);
             self.fault(Some(axis as u8), cause, Event::Late);
         }
         false

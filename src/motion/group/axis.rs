@@ -7,7 +7,6 @@ use crate::motion::fixed;
 use crate::motion::mode::Mode;
 use crate::motion::path::{Path, Point, Sample};
 use crate::motion::position_control::{PositionControl, Tuning, Window};
-use crate::motion::scale::Scale;
 use crate::motion::{AxisConfig, AxisFeedback, GroupConfig};
 
 /// SYNCs that the path is ahead of the last sampled position: the next command
@@ -326,23 +325,9 @@ impl Axis {
         self.down = down as u32;
     }
 
-    /// The same, exactly as a set-point needs them, and its velocity. An error until the drive
-    /// has all of it: RPDO2 goes to one of `axes` in a cycle, 6081h is asked for.
-    pub(super) fn prepare(
-        &mut self,
-        scale: Scale,
-        velocity: f32,
-        up: f32,
-        down: f32,
-        axes: u32,
-    ) -> Result<(), u32> {
-        const HALF: f32 = 0.5;
-        let [up, down, speed] = [
-            scale.rpm_per_s(up),
-            scale.rpm_per_s(down),
-            scale.rpm(velocity),
-        ]
-        .map(|value| (value + HALF) as u32);
+    /// What its next set-point needs: velocity and ramps, rpm and rpm/s. Whether its drive
+    /// has it: RPDO2 goes to one of `axes` in a cycle, 6081h is asked for.
+    pub(in crate::motion) fn prepare(&mut self, [speed, up, down]: [u32; 3], axes: u32) -> bool {
         if (self.up, self.down) != (up, down) {
             (self.up, self.down, self.ramped) = (up, down, self.count);
         }
@@ -350,9 +335,9 @@ impl Axis {
         if self.speed != speed {
             // It may be written from now on.
             self.speed = 0;
+            return false;
         }
-        let has = self.speed == speed && self.count.wrapping_sub(self.ramped) > axes;
-        if has { Ok(()) } else { Err(speed) }
+        self.count.wrapping_sub(self.ramped) > axes
     }
 
     /// Its drive shows this in 6081h.
@@ -368,11 +353,11 @@ impl Axis {
     }
 
     /// What its drive is to show, and does not yet.
-    pub(super) fn setting_wanted(&self) -> Option<DriveSetting> {
+    pub(super) fn setting_wanted(&self) -> Option<(DriveSetting, u32)> {
         let rpm = self.speed_wanted;
         match self.wanted {
-            Some(mode) => Some(DriveSetting::Mode(mode)),
-            None if rpm != self.speed => Some(DriveSetting::ProfileVelocity(rpm)),
+            Some(mode) => Some((DriveSetting::Mode, mode as u32)),
+            None if rpm != self.speed => Some((DriveSetting::ProfileVelocity, rpm)),
             None => None,
         }
     }

@@ -98,10 +98,10 @@ pub struct AxisView {
 /// What a drive is to have, and is asked for until it shows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DriveSetting {
-    /// To be written to 6060h and shown in 6061h.
-    Mode(Mode),
-    /// Of the next set-point, rpm: to be written to 6081h and shown there.
-    ProfileVelocity(u32),
+    /// Mode of operation: to be written to 6060h and shown in 6061h.
+    Mode,
+    /// Velocity of the next set-point: to be written to 6081h and shown there.
+    ProfileVelocity,
 }
 
 /// An axis whose drive is to be written to.
@@ -109,6 +109,8 @@ pub enum DriveSetting {
 pub struct Wanted {
     /// Counted from 0.
     pub axis: usize,
-    /// What.
+    /// What of it.
     pub setting: DriveSetting,
+    /// A mode as 6060h has it, or rpm.
+    pub value: u32,
 }

@@ -217,6 +217,10 @@ impl<const N: usize> Group<N> {
         self.axes.get(axis)
     }
 
+    pub(super) fn axis_mut(&mut self, axis: usize) -> Option<&mut Axis> {
+        self.axes.get_mut(axis)
+    }
+
     /// Whether there are events to take.
     pub fn has_events(&self) -> bool {
         !self.events.queue.is_empty()
@@ -307,25 +311,6 @@ impl<const N: usize> Group<N> {
         of.set_ramps(ramp(up), ramp(down));
     }
 
-    /// What the next set-point of an axis needs of its drive: its highest velocity and its
-    /// ramps, in increments and cycles. An error until the drive has them: the velocity in
-    /// rpm.
-    pub(super) fn prepare(
-        &mut self,
-        axis: usize,
-        velocity: f32,
-        up: f32,
-        down: f32,
-    ) -> Result<(), u32> {
-        let (Some(config), Some(of)) = (self.config, self.axes.get_mut(axis)) else {
-            return Ok(());
-        };
-        let Some(limits) = config.axes.get(axis) else {
-            return Ok(());
-        };
-        of.prepare(limits.scale, velocity, up, down, N as u32)
-    }
-
     /// A set-point of profile position mode, to be handed to the drive. `false`:
     /// the drive has not taken the last one yet, or the group is not released, or
     /// the axis is in another mode.
@@ -371,27 +356,31 @@ impl<const N: usize> Group<N> {
     fn next_wanted(&self) -> Option<Wanted> {
         let mut look = self.here();
         while let Some(axis) = next(&mut look) {
-            if let Some(setting) = self.axes.get(axis)?.setting_wanted() {
-                return Some(Wanted { axis, setting });
+            if let Some((setting, value)) = self.axes.get(axis)?.setting_wanted() {
+                return Some(Wanted {
+                    axis,
+                    setting,
+                    value,
+                });
             }
         }
         None
     }
 
     /// The drive of an axis shows what was wanted.
-    pub fn confirm(&mut self, shown: Wanted) {
+    pub fn confirm(&mut self, shown: &Wanted) {
         let Some(axis) = self.axes.get_mut(shown.axis) else {
             return;
         };
-        match shown.setting {
-            DriveSetting::Mode(mode) if axis.wanted == Some(mode) => {
+        match (shown.setting, axis.wanted) {
+            (DriveSetting::Mode, Some(mode)) if shown.value == mode as u32 => {
                 axis.wanted = None;
                 axis.take_mode(mode);
                 axis.hold_actual();
                 self.set_ramps(shown.axis, 0.0, 0.0);
             }
-            DriveSetting::ProfileVelocity(rpm) => axis.show_speed(rpm),
-            DriveSetting::Mode(_) => {}
+            (DriveSetting::ProfileVelocity, _) => axis.show_speed(shown.value),
+            _ => {}
         }
     }
 
