@@ -6,7 +6,7 @@ use canmaster::motion::experiment::{self, GROUP, Motor};
 use canmaster::motion::{GroupConfig, format};
 use canmaster::time::Duration;
 use canmaster_network::model::Machine;
-use canmaster_network::program::{self, Action, Group, Program};
+use canmaster_network::program::{self, Action, Group, Origin, Program};
 use canmaster_network::{Severity, Source, load, read_for_firmware};
 
 fn workspace() -> PathBuf {
@@ -268,6 +268,79 @@ fn a_wait_is_a_rest_unless_the_drive_goes_on() {
     };
     assert_eq!(sure("profile position"), [false, true, true]);
     assert_eq!(sure("cyclic synchronous position"), [true; 3]);
+}
+
+/// A torque leads anywhere: what follows counts from there, or may be made already.
+#[test]
+fn a_torque_is_no_rest_and_leads_anywhere() {
+    let group = Group::of(&sample()).unwrap();
+    let course = compiled(
+        "velocity = 600\nacceleration = 6000\n\
+         [[step]]\n[[step.move]]\naxes = [\"axis 1\"]\nto = 5000\n\
+         [[step]]\n[step.mode]\naxes = [\"axis 1\", \"axis 2\"]\n\
+         is = \"cyclic synchronous torque\"\n\
+         [[step]]\n[[step.move]]\naxes = [\"axis 1\", \"axis 2\"]\nto = [90, 80]\n\
+         [[step.move]]\naxes = [\"axis 3\"]\nto = 4000\n\
+         [[step]]\n[[step.move]]\naxes = [\"axis 1\", \"axis 2\"]\nto = 0\n\
+         [[step]]\n[step.mode]\naxes = [\"axis 1\", \"axis 2\"]\n\
+         is = \"profile velocity\"\n\
+         [[step]]\n[[step.move]]\naxes = [\"axis 1\", \"axis 3\"]\nby = 300\n\
+         [[step]]\n[[step.move]]\nto = 0\n",
+    )
+    .course(&group);
+    assert!(course.torque);
+    let stops = |axis: usize| -> Vec<(i32, Origin)> {
+        let of_axis = course.rests.iter().filter_map(|rest| rest[axis]);
+        of_axis.map(|stop| (stop.target, stop.origin)).collect()
+    };
+    let from_anywhere = |by: i32| Origin::HomeFromAnywhere { left: 0, by };
+    let home = |target: i32| (target, Origin::Home);
+    assert_eq!(
+        stops(0),
+        [home(5000), (300, Origin::Left(0)), (0, from_anywhere(300))]
+    );
+    assert_eq!(stops(1), [(0, from_anywhere(0))]);
+    assert_eq!(stops(2), [home(4000), home(4300), home(0)]);
+    // Nobody knows who of those two goes less far.
+    let end = course.rests.last().unwrap();
+    assert_ne!(end[0].unwrap().set, end[1].unwrap().set);
+    assert!(!of_project("pairs.toml").course(&group).torque);
+}
+
+/// 60 per mille at 600 per mille a second: 100 ms.
+#[test]
+fn a_torque_takes_as_long_as_its_ramp() {
+    let group = Group::of(&sample()).unwrap();
+    let least = |to: i32| {
+        let program = compiled(&format!(
+            "velocity = 600\nacceleration = 60_000\n\
+             [[step]]\n[step.mode]\nis = \"cyclic synchronous torque\"\n\
+             [[step]]\n[[step.move]]\nto = 60\n[[step]]\n[[step.move]]\nto = {to}\n"
+        ));
+        program.course(&group).least
+    };
+    let back = least(0) - least(60);
+    assert!((8..=12).contains(&back), "{back}");
+}
+
+/// Drives in profile position mode make their own ramps: no two of them, and no other
+/// axis, have to stop with one.
+#[test]
+fn a_drive_that_makes_its_own_ramps_stops_for_itself() {
+    let group = Group::of(&sample()).unwrap();
+    for settle in [true, false] {
+        let course = compiled(&format!(
+            "velocity = 1000\nacceleration = 5000\n[[step]]\n[step.mode]\n\
+             axes = [\"axis 1\", \"axis 2\"]\nis = \"profile position\"\n\
+             [[step]]\nsettle = {settle}\n[[step.move]]\nto = 5000\n\
+             [[step]]\n[[step.move]]\nto = 0\n"
+        ))
+        .course(&group);
+        for rest in &course.rests {
+            let sets: Vec<u8> = rest.iter().map(|stop| stop.unwrap().set).collect();
+            assert_eq!(sets, [1, 2, 3, 3, 3, 3], "settle = {settle}");
+        }
+    }
 }
 
 #[test]

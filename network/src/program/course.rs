@@ -1,13 +1,15 @@
 //! What a program does to the axes: where they come to rest, and when it is done.
 
 use super::axes::{CYCLIC_TORQUE, Group, PROFILE_POSITION};
-use super::{Action, Path, Program, Step, slow, timing};
+use super::{Action, Part, Path, Program, Step, slow, timing};
 
 /// Between the end of a reference and the next step when nothing disturbs the axes:
 /// delay of the loop, last increments, confirmation, planning.
 const SETTLING_CYCLES: u64 = 14;
 /// A mode is written, confirmed, and the group released again.
 const MODE_MS: f64 = 400.0;
+/// Until an axis that a torque has driven stands, and is led back from there.
+const RUN_OUT_MS: f64 = 5000.0;
 /// A rest that everybody sees, ms; a shorter one may be none.
 const REST_MS: f64 = 150.0;
 /// What is done for ever is done so often here.
@@ -29,16 +31,22 @@ pub struct Course {
     pub least: u64,
     /// It does not end by itself, or is too long to be followed.
     pub endless: bool,
+    /// Axes are driven by torque: they may turn or not, and as long as they like, so that
+    /// nobody who only looks at them can say when it is over.
+    pub torque: bool,
 }
 
 /// Where an axis comes to rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Stop {
-    /// Increments from home.
+    /// Increments from its origin.
     pub target: i32,
+    /// What they count from.
+    pub origin: Origin,
     /// Axes with the same number do the same, and stop together to be seen: of two
-    /// that arrive together, the one that goes less far is slow before.
+    /// that arrive together, the one that goes less far is slow before. A drive that makes
+    /// its own ramps has a number for itself.
     pub set: u8,
     /// It is seen to rest there; else the next step may begin at once.
     pub sure: bool,
@@ -46,6 +54,26 @@ pub struct Stop {
     /// seem to rest while it passes.
     pub within: u32,
 }
+
+/// What the target of an axis counts from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Origin {
+    /// Its home.
+    Home,
+    /// Its home. It begins anywhere, so that it may stand at its target already.
+    HomeFromAnywhere {
+        /// As [`Origin::Left`].
+        left: usize,
+        /// It begins so many increments from there.
+        by: i32,
+    },
+    /// Where it was as it left that mode for the nth time, from 0.
+    Left(usize),
+}
+
+/// What is alike for no other axis, beside the numbers of sets.
+const BY_DRIVE: u8 = u8::MAX - 1;
+const FROM_ANYWHERE: u8 = u8::MAX - 2;
 
 /// Numbers for what is alike, from 1.
 #[derive(Default)]
@@ -66,7 +94,12 @@ impl Alike {
 struct Walk<'a> {
     group: &'a Group,
     course: Course,
+    /// Increments from the origin; in cyclic synchronous torque mode per mille.
     at: Vec<i64>,
+    /// Home, or where a torque has left it.
+    origins: Vec<Origin>,
+    /// How often each axis has left cyclic synchronous torque mode.
+    left_torque: Vec<usize>,
     modes: Vec<u8>,
     /// In this step.
     moved: Vec<Option<Stop>>,
@@ -86,6 +119,8 @@ impl Program {
             group,
             course: Course::default(),
             at: vec![0; self.axes],
+            origins: vec![Origin::Home; self.axes],
+            left_torque: vec![0; self.axes],
             modes: group.axes.iter().map(|axis| axis.mode).collect(),
             moved: vec![None; self.axes],
             on_its_way: vec![false; self.axes],
@@ -95,6 +130,9 @@ impl Program {
         };
         walk.steps(&self.steps);
         walk.end();
+        if walk.modes.contains(&CYCLIC_TORQUE) {
+            walk.course.cycles += u64::from(group.cycles(RUN_OUT_MS));
+        }
         if walk.held || walk.course.rests.is_empty() {
             // The board's clock is not exact, and it may begin nearer.
             walk.course.least = walk.least * 9 / 10;
@@ -128,19 +166,62 @@ impl Walk<'_> {
         }
     }
 
-    fn go(&mut self, axis: usize, to: i64, set: u8) {
+    /// An axis is led to a position, or by a distance, in a set of its step.
+    fn go(&mut self, part: &Part, relative: bool, alike: &mut Alike) {
+        let axis = part.axis;
+        let (at, known) = (self.at[axis], self.origins[axis]);
+        let to = i64::from(part.target) + if relative { at } else { 0 };
+        self.at[axis] = to;
         if self.modes[axis] == CYCLIC_TORQUE {
+            self.course.torque = true;
             return;
         }
-        if to != self.at[axis] {
+        let origin = match known {
+            Origin::Left(left) if !relative => {
+                self.origins[axis] = Origin::Home;
+                let by = at as i32;
+                Origin::HomeFromAnywhere { left, by }
+            }
+            known => known,
+        };
+        let from_anywhere = origin != known;
+        let set = if self.modes[axis] == PROFILE_POSITION {
+            alike.number((BY_DRIVE, axis as i64))
+        } else if from_anywhere {
+            alike.number((FROM_ANYWHERE, axis as i64))
+        } else {
+            alike.number((part.set, (to - at).abs()))
+        };
+        if to != at || from_anywhere {
             self.moved[axis] = Some(Stop {
                 target: to as i32,
+                origin,
                 set,
                 sure: false,
                 within: 0,
             });
         }
-        self.at[axis] = to;
+    }
+
+    /// All of them stand, and change their mode.
+    fn change(&mut self, axes: u32, mode: u8) {
+        let mut run_out = false;
+        for axis in (0..self.modes.len()).filter(|axis| axes >> axis & 1 != 0) {
+            let before = std::mem::replace(&mut self.modes[axis], mode);
+            if before == mode {
+                continue;
+            }
+            if before == CYCLIC_TORQUE {
+                run_out = true;
+                self.origins[axis] = Origin::Left(self.left_torque[axis]);
+                self.left_torque[axis] += 1;
+            }
+            if [before, mode].contains(&CYCLIC_TORQUE) {
+                self.at[axis] = 0;
+            }
+        }
+        let ms = MODE_MS + if run_out { RUN_OUT_MS } else { 0.0 };
+        self.course.cycles += u64::from(self.group.cycles(ms));
     }
 
     fn steps(&mut self, steps: &[Step]) {
@@ -160,13 +241,9 @@ impl Walk<'_> {
                 let cycles = timing::cycles(self.group, a_move, &self.at);
                 let mut alike = Alike::default();
                 for part in &a_move.parts {
-                    let at = self.at[part.axis];
                     let alone = self.modes[part.axis] == PROFILE_POSITION;
                     self.on_its_way[part.axis] = alone && a_move.flying;
-                    let from = if a_move.relative { at } else { 0 };
-                    let to = from + i64::from(part.target);
-                    let set = alike.number((part.set, (to - at).abs()));
-                    self.go(part.axis, to, set);
+                    self.go(part, a_move.relative, &mut alike);
                 }
                 self.pass();
                 self.least += cycles;
@@ -191,19 +268,14 @@ impl Walk<'_> {
                 self.end();
                 for axis in 0..self.at.len() {
                     if axes >> axis & 1 != 0 {
-                        self.at[axis] = 0;
+                        (self.at[axis], self.origins[axis]) = (0, Origin::Home);
                     }
                 }
                 self.course.cycles += u64::from(*limit);
             }
             Action::Mode { axes, mode } => {
                 self.end();
-                for (axis, of) in self.modes.iter_mut().enumerate() {
-                    if axes >> axis & 1 != 0 {
-                        *of = *mode;
-                    }
-                }
-                self.course.cycles += u64::from(self.group.cycles(MODE_MS));
+                self.change(*axes, *mode);
             }
         }
     }
@@ -235,6 +307,7 @@ impl Walk<'_> {
                 let mut rest = vec![None; self.at.len()];
                 rest[of.axis] = Some(Stop {
                     target: (begin + place) as i32,
+                    origin: self.origins[of.axis],
                     set,
                     sure: false,
                     within,
@@ -244,6 +317,7 @@ impl Walk<'_> {
             // It moved, wherever it ends.
             self.moved[of.axis] = Some(Stop {
                 target: self.at[of.axis] as i32,
+                origin: self.origins[of.axis],
                 set,
                 sure: false,
                 within: slow.end,

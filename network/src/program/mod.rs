@@ -17,7 +17,7 @@ mod timing;
 mod units;
 
 pub use axes::{Axis, Group};
-pub use course::{Course, Stop};
+pub use course::{Course, Origin, Stop};
 pub use pairs::pairs;
 
 use std::path::Path as FilePath;

@@ -1,6 +1,6 @@
 //! How long a move takes: the shortest whole cycles that keep the limits.
 
-use super::axes::Group;
+use super::axes::{Group, TORQUE};
 use super::{Move, Part};
 
 /// Longest move in cycles: what the firmware plans.
@@ -33,10 +33,16 @@ pub(super) fn cycles(group: &Group, a_move: &Move, from: &[i64]) -> u64 {
 fn leg(group: &Group, part: &Part, relative: bool, from: &[i64]) -> Option<Leg> {
     let axis = group.axes.get(part.axis)?;
     let from = if relative { 0 } else { *from.get(part.axis)? };
-    let slope = axis.per_rpm_s(group.cycle_us);
+    let (speed, slope) = if part.set & TORQUE != 0 {
+        // Per mille a second, and a second squared.
+        let cycle = f64::from(group.cycle_us) / 1e6;
+        (cycle, cycle * cycle)
+    } else {
+        (axis.per_rpm(group.cycle_us), axis.per_rpm_s(group.cycle_us))
+    };
     Some(Leg {
         way: (i64::from(part.target) - from).abs() as f64,
-        velocity: f64::from(part.velocity) * axis.per_rpm(group.cycle_us),
+        velocity: f64::from(part.velocity) * speed,
         up: f64::from(part.acceleration) * slope,
         down: f64::from(part.deceleration) * slope,
     })

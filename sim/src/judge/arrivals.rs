@@ -1,6 +1,7 @@
 //! Who arrived where: movements in the plant against the program's targets.
 
 use canmaster::NodeId;
+use canmaster_network::program::Origin;
 
 use super::axis::{AxisMonitor, Movement};
 use crate::time::Time;
@@ -11,8 +12,10 @@ const NEAR: i64 = 50;
 /// What one move asks of one axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Part {
-    /// Increments from the axis' home: where it stood when it was enabled.
+    /// Increments from its origin; the axis' home is where it stood when it was enabled.
     pub target: i32,
+    /// What they count from.
+    pub origin: Origin,
     /// Axes of one set start and stop together.
     pub set: u8,
     /// It is seen to rest there; else its next part may begin at once.
@@ -32,6 +35,9 @@ pub struct Assignment {
     /// A release is not over before, however the axes stand meanwhile; 0: it is as soon
     /// as they have made all of their moves.
     pub least: Time,
+    /// Axes are driven by torque, which is no move: a release is not over before the
+    /// firmware says so.
+    pub torque: bool,
 }
 
 impl Assignment {
@@ -46,6 +52,15 @@ impl Assignment {
     }
 }
 
+/// Where an axis was when it left a mode.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Left {
+    /// When that was.
+    pub at: Time,
+    /// Increments.
+    pub position: i32,
+}
+
 /// A release: what the operator gave with the button.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Release {
@@ -53,12 +68,59 @@ pub struct Release {
     pub at: Time,
     /// Where each axis stood when it was enabled, increments.
     pub homes: Vec<i32>,
+    /// Where each axis was each time that it left cyclic synchronous torque mode.
+    pub left: Vec<Vec<Left>>,
     /// When every axis had come to rest after its last move.
     pub done: Option<Time>,
     /// It was taken back before that: the stop button, a reset, a fault.
     pub revoked: bool,
     /// Another tool gave it: where the axes go is not known here.
     pub ordered: bool,
+}
+
+impl Release {
+    /// The parts of an axis, all from its home, as far as it is known where it was left:
+    /// without those for which it was left where they lead to and has not moved. The
+    /// movements are those under this release.
+    pub fn placed(
+        &self,
+        axis: usize,
+        parts: &[(usize, Part)],
+        movements: &[&Movement],
+    ) -> Vec<(usize, Part)> {
+        let home = self.homes.get(axis).copied().unwrap_or(0);
+        let left = |time: usize| self.left.get(axis)?.get(time);
+        let mut placed = Vec::new();
+        for (place, &(step, part)) in parts.iter().enumerate() {
+            let mut from_home = part;
+            from_home.origin = Origin::Home;
+            if let Origin::Left(time) = part.origin
+                && let Some(left) = left(time)
+            {
+                let from = left.position.wrapping_sub(home);
+                from_home.target = part.target.wrapping_add(from);
+            }
+            if let Origin::HomeFromAnywhere { left: time, by } = part.origin
+                && let Some(from) = left(time)
+            {
+                let before = parts.iter().take(place);
+                let before = before.filter(|(_, part)| part.origin == Origin::Left(time));
+                let before = before.filter(|(_, part)| part.sure).count();
+                let target = home.wrapping_add(part.target);
+                let until = left(time + 1).map_or(Time::MAX, |next| next.at);
+                let mut since = movements.iter().filter(|made| made.started >= from.at);
+                let made = since.nth(before).filter(|made| made.started < until);
+                let gone = made.is_some_and(|made| made.error(target) <= NEAR);
+                let begin = from.position.wrapping_add(by);
+                let way = i64::from(target) - i64::from(begin);
+                if way.abs() <= NEAR && !gone {
+                    continue;
+                }
+            }
+            placed.push((step, from_home));
+        }
+        placed
+    }
 }
 
 /// One axis at the end of one move.
@@ -133,14 +195,13 @@ pub fn arrivals(
             continue;
         }
         for (axis, (monitor, &node)) in axes.iter().zip(nodes).enumerate() {
-            let movements = monitor
-                .movements()
-                .iter()
-                .filter(|movement| movement.release == number);
+            let movements: Vec<&Movement> = monitor.under(number).collect();
             let Some(&home) = release.homes.get(axis) else {
                 continue;
             };
             let parts: Vec<(usize, Part)> = assignment.of_axis(axis).collect();
+            let parts = release.placed(axis, &parts, &movements);
+            let movements = movements.into_iter();
             for (movement, step, part) in matched(movements, &parts, home, release.done.is_some()) {
                 let target = home.wrapping_add(part.target);
                 all.push(Arrival {
@@ -203,6 +264,7 @@ mod tests {
             vec![
                 Some(Part {
                     target,
+                    origin: Origin::Home,
                     set: 1,
                     sure: true,
                     within: 0,
@@ -214,6 +276,7 @@ mod tests {
             moves: vec![both(20_000), both(0)],
             cycle: Time::from_ms(10),
             least: Time::ZERO,
+            torque: false,
         }
     }
 
@@ -222,6 +285,7 @@ mod tests {
         Release {
             at: Time::from_ms(at_ms),
             homes: vec![100, 100],
+            left: vec![Vec::new(); 2],
             done,
             revoked: false,
             ordered: false,
@@ -263,6 +327,7 @@ mod tests {
     fn where_the_next_step_begins_at_once_an_axis_may_rest_or_not() {
         let part = |target, sure| Part {
             target,
+            origin: Origin::Home,
             set: 1,
             sure,
             within: 0,
@@ -296,6 +361,7 @@ mod tests {
     fn where_an_axis_is_slow_it_may_seem_to_rest_or_not() {
         let part = |target, sure, within| Part {
             target,
+            origin: Origin::Home,
             set: 1,
             sure,
             within,

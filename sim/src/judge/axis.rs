@@ -121,9 +121,28 @@ impl AxisMonitor {
         }
     }
 
+    /// What it does from now on is another movement, if it stands now, however shortly.
+    pub fn divide(&mut self) {
+        let Some(now) = self.last else { return };
+        let movement = self.movements.last_mut();
+        if let Some(movement) = movement.filter(|movement| !movement.settled)
+            && now.velocity.abs() <= STANDSTILL_RPM
+        {
+            movement.settled = true;
+            movement.rest_low = now.position;
+            movement.rest_high = now.position;
+        }
+    }
+
     /// Every movement so far.
     pub fn movements(&self) -> &[Movement] {
         &self.movements
+    }
+
+    /// Those that began under a release, by its number.
+    pub fn under(&self, release: usize) -> impl Iterator<Item = &Movement> {
+        let all = self.movements.iter();
+        all.filter(move |movement| movement.release == release)
     }
 
     /// The way behind it, forth and back added up, increments.

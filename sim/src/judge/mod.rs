@@ -14,9 +14,10 @@ pub mod sdo;
 pub mod skew;
 pub mod verdict;
 
-pub use arrivals::{Arrival, Assignment, Part, Release, arrivals, matched, worst_pair};
+pub use arrivals::{Arrival, Assignment, Left, Part, Release, arrivals, matched, worst_pair};
 pub use axis::{AxisMonitor, Movement, STANDSTILL_RPM, TracePoint};
 pub use bus::{BusFigures, Traffic};
+pub use canmaster_network::program::Origin;
 pub use contract::{Cause, Limit, Limits, Reaction};
 pub use coordination::{Edge, Span};
 pub use lss::LssFigures;

@@ -4,8 +4,8 @@ use std::fmt;
 
 use canmaster::NodeId;
 
-use super::arrivals::{Arrival, Assignment, Release, worst_pair};
-use super::axis::{AxisMonitor, STANDSTILL_RPM};
+use super::arrivals::{Arrival, Assignment, Part, Release, worst_pair};
+use super::axis::{AxisMonitor, Movement, STANDSTILL_RPM};
 use super::bus::BusFigures;
 use crate::time::Time;
 
@@ -178,14 +178,12 @@ fn moves_missing(evidence: &Evidence<'_>) -> Option<String> {
             continue;
         }
         for (place, (node, axis)) in evidence.nodes.iter().zip(evidence.axes).enumerate() {
-            let expected = evidence.assignment.of_axis(place).count();
-            let sure = evidence.assignment.of_axis(place);
-            let sure = sure.filter(|(_, part)| part.sure).count();
-            let made = axis
-                .movements()
-                .iter()
-                .filter(|movement| movement.release == number)
-                .count();
+            let parts: Vec<(usize, Part)> = evidence.assignment.of_axis(place).collect();
+            let movements: Vec<&Movement> = axis.under(number).collect();
+            let parts = release.placed(place, &parts, &movements);
+            let expected = parts.len();
+            let sure = parts.iter().filter(|(_, part)| part.sure).count();
+            let made = movements.len();
             if !(sure..=expected).contains(&made) {
                 return Some(format!(
                     "node {}: made {made} moves after release {number}, not the program's {expected}",
@@ -214,8 +212,9 @@ fn out_of_step(evidence: &Evidence<'_>) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use canmaster_network::program::Origin;
+
     use super::*;
-    use crate::judge::arrivals::Part;
     use crate::judge::axis::TracePoint;
 
     struct Case {
@@ -265,6 +264,7 @@ mod tests {
             releases: vec![Release {
                 at: Time::ZERO,
                 homes: vec![0, 0],
+                left: vec![Vec::new(); 2],
                 done: Some(Time::from_ms(600)),
                 revoked: false,
                 ordered: false,
@@ -283,6 +283,7 @@ mod tests {
                 moves: vec![vec![
                     Some(Part {
                         target: 7,
+                        origin: Origin::Home,
                         set: 1,
                         sure: true,
                         within: 0
@@ -291,6 +292,7 @@ mod tests {
                 ]],
                 cycle: Time::from_ms(10),
                 least: Time::ZERO,
+                torque: false,
             },
             releases: &case.releases,
             arrivals: &case.arrivals,

@@ -59,6 +59,7 @@ pub struct Machine {
     moves: Vec<Vec<Option<Part>>>,
     round_trip: Option<Time>,
     least: Time,
+    torque: bool,
 }
 
 /// The sample: six EPOS4.
@@ -70,6 +71,7 @@ pub fn sample() -> &'static Machine {
             moves,
             round_trip,
             least,
+            torque,
         } = course(&program::pairs(&group), &group);
         Machine {
             network: &SIX_EPOS4,
@@ -78,6 +80,7 @@ pub fn sample() -> &'static Machine {
             moves,
             round_trip,
             least,
+            torque,
         }
     });
     &SAMPLE
@@ -122,6 +125,7 @@ impl Machine {
             moves,
             round_trip,
             least,
+            torque,
         } = course(program, &group);
         Ok(Machine {
             network,
@@ -130,6 +134,7 @@ impl Machine {
             moves,
             round_trip,
             least,
+            torque,
         })
     }
 
@@ -160,6 +165,7 @@ impl Machine {
             moves: self.moves.clone(),
             cycle: Time::from(self.network.cycle),
             least: self.least,
+            torque: self.torque,
         }
     }
 
@@ -207,6 +213,8 @@ struct Moves {
     round_trip: Option<Time>,
     /// It is not over before, however the axes stand meanwhile.
     least: Time,
+    /// Axes are driven by torque.
+    torque: bool,
 }
 
 /// What a program asks for, as the description has it and nobody else.
@@ -215,13 +223,16 @@ fn course(program: &Program, group: &Group) -> Moves {
     let part = |stop: Option<program::Stop>| {
         stop.map(|stop| Part {
             target: stop.target,
+            origin: stop.origin,
             set: stop.set,
             sure: stop.sure,
             within: stop.within,
         })
     };
-    // One that does not end is never seen to have ended.
-    let times = if course.endless { NEVER } else { 1 };
+    // One that does not end is never seen to have ended: by torque it has to say so, and
+    // is left elsewhere each time.
+    let again = course.endless && !course.torque;
+    let times = if again { NEVER } else { 1 };
     let rests = std::iter::repeat_n(course.rests, times).flatten();
     let moves = rests.map(|rest| rest.into_iter().map(part).collect());
     let time = |cycles: u64| Time::from_us(cycles * u64::from(group.cycle_us));
@@ -229,6 +240,7 @@ fn course(program: &Program, group: &Group) -> Moves {
         moves: moves.collect(),
         round_trip: (!course.endless).then_some(time(course.cycles)),
         least: time(course.least),
+        torque: course.torque,
     }
 }
 

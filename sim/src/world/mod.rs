@@ -136,7 +136,8 @@ impl<'i> World<'i> {
         let moves = (0..stations.len())
             .map(|axis| assignment.of_axis(axis).collect())
             .collect();
-        let least = assignment.least;
+        let watch = Watch::new(moves).at_least(assignment.least);
+        let watch = watch.with_torque(assignment.torque);
         let mut agenda = Agenda::default();
         for (at, stimulus) in &scenario.stimuli {
             agenda.add(*at, stimulus.clone());
@@ -162,7 +163,7 @@ impl<'i> World<'i> {
             agenda,
             operator,
             orders: Orders::new(machine.network().master.node),
-            watch: Watch::new(moves).at_least(least),
+            watch,
             decoder: image.log_table().decoder(),
             log: Vec::new(),
             complained: None,

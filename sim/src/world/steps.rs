@@ -17,6 +17,8 @@ const LOOK: Time = Time::from_us(200);
 /// After a complaint of the firmware and standstill, how long it may go on to
 /// say why.
 const LAST_WORDS: Time = Time::from_ms(200);
+/// How the firmware says that a program has come to its end.
+const PROGRAM_DONE: &str = "program done";
 
 impl World<'_> {
     /// One step of the event loop, at most until `limit`.
@@ -156,6 +158,9 @@ impl World<'_> {
             if line.level == Some(Level::Error) && self.complained.is_none() {
                 self.complained = Some(self.now);
                 self.watch.revoke(self.now + LAST_COMMAND);
+            }
+            if line.message == PROGRAM_DONE {
+                self.watch.say_done();
             }
             self.log.push((self.now, line));
         }

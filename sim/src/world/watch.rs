@@ -2,7 +2,7 @@
 //! has come home.
 
 use crate::drive::cia402::State;
-use crate::judge::{AxisMonitor, Part, Release, TracePoint, matched};
+use crate::judge::{AxisMonitor, Left, Movement, Part, Release, TracePoint, matched};
 use crate::time::Time;
 
 /// Full motion: all axes turn faster than this, rpm.
@@ -15,8 +15,10 @@ pub(super) const LAST_COMMAND: Time = Time::from_ms(250);
 
 /// 6061h: homing.
 const HOMING: i8 = 6;
-/// What an axis does to find its home counts as released, and as no move.
-const SEARCH: usize = usize::MAX;
+/// Cyclic synchronous torque.
+const TORQUE: i8 = 10;
+/// What an axis does to find its home, or by torque, counts as released, and as no move.
+const NO_MOVE: usize = usize::MAX;
 
 /// Whether this counts as full motion.
 pub(super) fn is_full_motion(velocity_rpm: f64) -> bool {
@@ -69,6 +71,10 @@ pub(super) struct Watch {
     moves: Vec<Vec<(usize, Part)>>,
     /// As [`crate::judge::Assignment::least`].
     least: Time,
+    /// As [`crate::judge::Assignment::torque`].
+    torque: bool,
+    /// The firmware has said so since the newest release.
+    said_done: bool,
     homes: Vec<i32>,
     enabled: Vec<bool>,
     /// Motion is allowed under the newest release.
@@ -91,6 +97,8 @@ impl Watch {
             states: vec![Vec::new(); axes],
             moves,
             least: Time::ZERO,
+            torque: false,
+            said_done: false,
             homes: vec![0; axes],
             enabled: vec![false; axes],
             released: false,
@@ -106,6 +114,16 @@ impl Watch {
         Watch { least, ..self }
     }
 
+    /// If axes are driven by torque no round trip is over before the firmware says so.
+    pub(super) fn with_torque(self, torque: bool) -> Watch {
+        Watch { torque, ..self }
+    }
+
+    /// The firmware says that its program is done.
+    pub(super) fn say_done(&mut self) {
+        self.said_done = true;
+    }
+
     /// Takes in the truth; a drive that is missing has none. True if a round
     /// trip was finished just now.
     pub(super) fn sample(&mut self, at: Time, truth: &[Option<AxisTruth>]) -> bool {
@@ -115,7 +133,7 @@ impl Watch {
             self.spent[axis] |= revoked && self.axes[axis].at_rest();
             let allowed = self.released && !self.spent[axis];
             let number = match truth.mode {
-                HOMING => SEARCH,
+                HOMING | TORQUE => NO_MOVE,
                 _ => self.releases.len(),
             };
             let release = allowed.then_some(number);
@@ -128,9 +146,9 @@ impl Watch {
                 release,
             );
             let AxisTruth { state, mode, .. } = *truth;
-            let last = self.states[axis].last();
-            if mode != HOMING && last.is_some_and(|last| last.mode == HOMING) {
-                self.has_home(axis, truth);
+            let before = self.states[axis].last().map(|last| last.mode);
+            if before.is_some_and(|before| before != mode) {
+                self.change(axis, at, truth, before);
             }
             let last = self.states[axis].last();
             if last.is_none_or(|last| (last.state, last.mode) != (state, mode)) {
@@ -152,6 +170,21 @@ impl Watch {
         }
         self.full_motion |= all(|axis| is_full_motion(axis.velocity));
         self.finish_release(at)
+    }
+
+    /// An axis that changes its mode stands: what follows is another movement.
+    fn change(&mut self, axis: usize, at: Time, truth: &AxisTruth, before: Option<i8>) {
+        self.axes[axis].divide();
+        match before {
+            Some(HOMING) => self.has_home(axis, truth),
+            Some(TORQUE) => {
+                if let Some(release) = self.releases.last_mut().filter(|_| self.released) {
+                    let position = truth.position.round() as i64 as i32;
+                    release.left[axis].push(Left { at, position });
+                }
+            }
+            _ => {}
+        }
     }
 
     /// After its search the moves of an axis count from where its drive shows 0.
@@ -200,11 +233,13 @@ impl Watch {
         self.releases.push(Release {
             at,
             homes: self.homes.clone(),
+            left: vec![Vec::new(); self.homes.len()],
             done: None,
             revoked: false,
             ordered,
         });
         self.released = true;
+        self.said_done = false;
         self.revoked_at = None;
         self.spent.fill(false);
     }
@@ -242,16 +277,15 @@ impl Watch {
             self.released = self.revoked_at.is_some_and(|since| at < since);
             return false;
         }
-        if at < release.at + self.least {
+        if at < release.at + self.least || (self.torque && !self.said_done) {
             return false;
         }
         let axes = self.axes.iter().zip(&self.moves).zip(&release.homes);
-        for ((axis, parts), home) in axes {
-            let movements = axis.movements().iter();
-            let movements = movements.filter(|movement| movement.release == number);
-            let last = matched(movements, parts, *home, true)
-                .last()
-                .map(|made| made.1);
+        for (place, ((axis, all), home)) in axes.enumerate() {
+            let movements: Vec<&Movement> = axis.under(number).collect();
+            let parts = release.placed(place, all, &movements);
+            let made = matched(movements.into_iter(), &parts, *home, true);
+            let last = made.last().map(|made| made.1);
             if last != parts.last().map(|part| part.0) {
                 return false;
             }
@@ -266,6 +300,8 @@ impl Watch {
 
 #[cfg(test)]
 mod tests {
+    use canmaster_network::program::Origin;
+
     use super::*;
 
     fn truth(position: f64, velocity: f64) -> Vec<Option<AxisTruth>> {
@@ -284,6 +320,7 @@ mod tests {
     fn moves(count: usize) -> Vec<(usize, Part)> {
         let part = Part {
             target: 40,
+            origin: Origin::Home,
             set: 1,
             sure: true,
             within: 0,
@@ -385,6 +422,7 @@ mod tests {
     fn a_slow_turning_point_is_not_the_end_and_what_follows_the_end_is_unreleased() {
         let part = |target, sure| Part {
             target,
+            origin: Origin::Home,
             set: 1,
             sure,
             within: 20,
@@ -409,6 +447,50 @@ mod tests {
         watch.sample(Time::from_ms(1), &all);
         assert!(!watch.ready());
         assert_eq!(watch.startup, Startup::default());
+    }
+
+    /// It turns in this mode for 200 ms and has stood for less than it takes to be seen
+    /// when the mode changes.
+    fn shortly(watch: &mut Watch, start_ms: u64, position: f64, mode: i8) -> bool {
+        (0..290).fold(false, |done, ms| {
+            let velocity = if ms < 200 { 900.0 } else { 0.0 };
+            let mut truth = truth(position, velocity);
+            truth[0].as_mut().unwrap().mode = mode;
+            done | watch.sample(Time::from_ms(start_ms + ms), &truth)
+        })
+    }
+
+    #[test]
+    fn a_torque_is_no_move_and_its_end_is_when_the_firmware_says_so() {
+        let part = |target, origin| Part {
+            target,
+            origin,
+            set: 1,
+            sure: true,
+            within: 0,
+        };
+        let from_anywhere = Origin::HomeFromAnywhere { left: 0, by: 500 };
+        let parts = [part(500, Origin::Left(0)), part(0, from_anywhere)];
+        let parts = parts.into_iter().enumerate().collect();
+        let mut watch = Watch::new(vec![parts]).with_torque(true);
+        watch.sample(Time::from_ms(1), &truth(10.0, 0.0));
+        watch.release(Time::from_ms(2));
+        shortly(&mut watch, 10, 7000.0, TORQUE);
+        let at = Time::from_ms(300);
+        watch.sample(at, &truth(7000.0, 0.0));
+        let position = 7000;
+        assert_eq!(watch.releases[0].left, [[Left { at, position }]]);
+        shortly(&mut watch, 301, 7500.0, 3);
+        let rest = |watch: &mut Watch, ms| watch.sample(Time::from_ms(ms), &truth(10.0, 0.0));
+        let mut other = truth(7500.0, 0.0);
+        other[0].as_mut().unwrap().mode = 1;
+        watch.sample(Time::from_ms(599), &other);
+        shortly(&mut watch, 600, 10.0, 1);
+        assert!(!rest(&mut watch, 1000), "nobody has said so");
+        watch.say_done();
+        assert!(rest(&mut watch, 1001));
+        assert_eq!(watch.axes[0].movements().len(), 3);
+        assert_eq!(watch.axes[0].unreleased(), None);
     }
 
     #[test]

@@ -14,7 +14,7 @@ use canmaster_sim::world::{Client, Scenario, World, enabled};
 
 use crate::common::image;
 
-const MASTER: NodeId = NodeId::constant::<127>();
+pub(crate) const MASTER: NodeId = NodeId::constant::<127>();
 pub(crate) const END: Time = Time::from_ms(90_000);
 pub(crate) const AXES: u8 = 6;
 /// For 2003h.
@@ -191,7 +191,7 @@ pub(crate) fn emergencies(client: &mut Client<'_>) -> Vec<Emcy> {
 }
 
 /// The machine as `network.toml` has it.
-fn described() -> model::Machine {
+pub(crate) fn described() -> model::Machine {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../network.toml");
     canmaster_network::load(file.as_ref()).machine.unwrap()
 }

@@ -6,6 +6,7 @@ mod common;
 
 mod commands;
 mod homing;
+mod judged;
 mod leader;
 mod modes;
 mod orders;

@@ -66,6 +66,7 @@ fn ran(seed: u64, program: &Program) -> Ran {
     let part = |stop: Stop| Part {
         target: stop.target,
         set: stop.set,
+        origin: stop.origin,
         sure: stop.sure,
         within: stop.within,
     };
