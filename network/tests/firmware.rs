@@ -134,7 +134,7 @@ fn another_unit_of_speeds_is_refused() {
     says(
         device,
         &tenths,
-        &["`FFB44700h`", refusal, "write 0x00B44700"],
+        &["`FFB44700h`", refusal, "10^-1: write 0x00B44700"],
     );
     let rpm = tenths.replace("FFB4", "00B4");
     assert_eq!(words(&sample().replacen(device, &rpm, 1)), "");

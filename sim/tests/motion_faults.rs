@@ -16,7 +16,7 @@ use canmaster_sim::judge::bus::syncs;
 use canmaster_sim::judge::{Outcome, STANDSTILL_RPM};
 use canmaster_sim::time::Time;
 use canmaster_sim::world::trials::{moving, spin_in_motion};
-use canmaster_sim::world::{Image, Record, Stimulus, World, sample};
+use canmaster_sim::world::{Image, Record, Stimulus, World, enabled, sample};
 
 use common::image;
 
@@ -316,4 +316,20 @@ fn an_overload_of_every_cycle_is_found_by_the_watchdog() {
 fn a_task_that_never_ends_is_found_by_the_watchdog() {
     // Nothing interrupts that of the SYNC.
     spin_in_motion(image(), 42, irqs::TIM2).unwrap_or_else(|error| panic!("{error}"));
+}
+
+/// A panic ends in a hard fault: the drives miss their master and stop by themselves, and
+/// after its reset nothing moves.
+#[test]
+fn a_panic_in_motion_stops_all() {
+    let mut world = moving(image(), 48).unwrap();
+    assert!(!world.at_rest());
+    let irq = irqs::TIM3;
+    world.apply(Stimulus::Crash { irq });
+    // Watchdog, consumer time of the drives, their ramp.
+    assert!(world.run_to(world.now() + Time::from_ms(700), World::at_rest));
+    assert_eq!(world.board().stats().resets.len(), 2);
+    let later = world.now() + Time::from_ms(4000);
+    assert!(!world.run_to(later, |world| !world.at_rest()));
+    assert!(world.statuses().flatten().all(|status| enabled(&status)));
 }

@@ -29,8 +29,8 @@ pub enum GroupState {
     Disabling,
     /// After a fault: the axes that still obey ramp together to standstill.
     FaultStop,
-    /// At standstill and disabled after a fault. Only a restart of the network
-    /// leads out.
+    /// At standstill and disabled after a fault. A fault reset leads out, and the node
+    /// or the network that was lost and is back.
     Faulted,
 }
 

@@ -147,9 +147,23 @@ fn units(description: &Description, node: &Node, described: &Described, context:
                 "the firmware has {what}: {at} of \"{}\" has to be {wanted:08X}h",
                 node.name
             ),
-            format!("write 0x{wanted:08X}, or leave it out"),
+            format!(
+                "{}write 0x{wanted:08X}, or leave it out",
+                of_ten(write.value, wanted)
+            ),
         );
     }
+}
+
+/// Says it where a value differs from the unit that is wanted only in the prefix, bits 31..24
+/// (CiA 402-2: a power of ten).
+fn of_ten(value: u32, wanted: u32) -> String {
+    const PREFIX_SHIFT: u32 = 24;
+    if (value ^ wanted) << u8::BITS != 0 {
+        return String::new();
+    }
+    let prefix = (value >> PREFIX_SHIFT) as u8 as i8;
+    format!("its prefix stands for 10^{prefix}: ")
 }
 
 /// What is too little to be led by.

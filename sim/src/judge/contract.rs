@@ -15,7 +15,7 @@ use crate::time::Time;
 const STOP_SYNC: u64 = 2;
 /// From a SYNC to its TPDOs, and the drives' control cycle: within one period.
 const ONE_CYCLE: u64 = 1;
-/// The fastest that any axis is ever commanded, rpm: the firmware's limit.
+/// The fastest that an axis is commanded in what the campaign strikes, rpm.
 const FASTEST_RPM: u64 = 2200;
 /// Deceleration of the fastest axis in a stop by the master, rpm/s.
 pub(super) const STOP_RPM_PER_S: u64 = 3000;
