@@ -12,6 +12,8 @@ const MODE_MS: f64 = 400.0;
 const RUN_OUT_MS: f64 = 5000.0;
 /// A rest that everybody sees, ms; a shorter one may be none.
 const REST_MS: f64 = 150.0;
+/// So many increments apart two places are one to whoever looks.
+const NEAR: u32 = 50;
 /// What is done for ever is done so often here.
 const FOR_EVER: u16 = 2;
 /// More is not unrolled.
@@ -133,6 +135,7 @@ impl Program {
         if walk.modes.contains(&CYCLIC_TORQUE) {
             walk.course.cycles += u64::from(group.cycles(RUN_OUT_MS));
         }
+        walk.held |= (0..self.axes).any(|axis| walk.comes_back(axis));
         if walk.held || walk.course.rests.is_empty() {
             // The board's clock is not exact, and it may begin nearer.
             walk.course.least = walk.least * 9 / 10;
@@ -142,6 +145,14 @@ impl Program {
 }
 
 impl Walk<'_> {
+    /// Whether an axis may rest where it ends before that is its end.
+    fn comes_back(&self, axis: usize) -> bool {
+        let mut stops = self.course.rests.iter().rev().filter_map(|rest| rest[axis]);
+        let last = stops.next();
+        let same = |stop: Stop| last.is_some_and(|last| stop.target.abs_diff(last.target) <= NEAR);
+        stops.any(|stop| !stop.sure && same(stop))
+    }
+
     /// A step has ended.
     fn pass(&mut self) {
         if self.moved.iter().any(Option::is_some) {
@@ -150,9 +161,14 @@ impl Walk<'_> {
         }
     }
 
-    /// All have come to rest.
-    fn end(&mut self) {
+    /// All have come to rest: so shortly that nobody may see it.
+    fn stand(&mut self) {
         self.on_its_way.fill(false);
+    }
+
+    /// All have come to rest, and stay.
+    fn end(&mut self) {
+        self.stand();
         self.rest();
     }
 
@@ -265,7 +281,7 @@ impl Walk<'_> {
             }
             Action::Path(path) => self.path(path),
             Action::Home { axes, limit } => {
-                self.end();
+                self.stand();
                 for axis in 0..self.at.len() {
                     if axes >> axis & 1 != 0 {
                         (self.at[axis], self.origins[axis]) = (0, Origin::Home);
@@ -274,7 +290,7 @@ impl Walk<'_> {
                 self.course.cycles += u64::from(*limit);
             }
             Action::Mode { axes, mode } => {
-                self.end();
+                self.stand();
                 self.change(*axes, *mode);
             }
         }

@@ -8,6 +8,9 @@ use crate::time::Time;
 
 /// So near to a place where it may rest, in increments, an axis rests there.
 const NEAR: i64 = 50;
+/// In that time an axis goes nowhere and back: another mode holds it some increments
+/// beside.
+const BRIEF: Time = Time::from_ms(50);
 
 /// What one move asks of one axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -146,8 +149,9 @@ pub struct Arrival {
 }
 
 /// Which of its `parts` an axis at `home` has made with each of its movements. One that
-/// ends at no place between is the next that is sure. Where it passes slowly it may have
-/// seemed to rest or not; if the program is `over`, its last movement led to the end.
+/// ends at no place between is the next that is sure, but for some increments where it
+/// stands. Where it passes slowly, or goes on soon, it may have seemed to rest or not; if
+/// the program is `over`, its last movement led to the end.
 pub fn matched<'m>(
     movements: impl Iterator<Item = &'m Movement>,
     parts: &[(usize, Part)],
@@ -164,6 +168,13 @@ pub fn matched<'m>(
             error <= NEAR.max(part.within.into())
         };
         let made = next.iter().position(|(_, part)| near(part));
+        let stood = all
+            .last()
+            .map_or(0, |(_, _, part): &(_, _, Part)| part.target);
+        let brief = movement.stopped.since(movement.started) < BRIEF;
+        if made.is_none() && brief && movement.error(home.wrapping_add(stood)) <= NEAR {
+            continue;
+        }
         let made = made.unwrap_or(next.len().saturating_sub(1));
         let Some(&(step, part)) = left.get(made) else {
             break;
@@ -172,8 +183,8 @@ pub fn matched<'m>(
         left = &left[made + 1..];
     }
     if over
-        && parts.iter().any(|(_, part)| part.within > 0)
         && let (Some(made), Some((&(step, part), between))) = (all.last_mut(), left.split_last())
+        && !made.2.sure
         && !between.iter().any(|(_, part)| part.sure)
         && made.0.error(home.wrapping_add(part.target)) <= NEAR.max(part.within.into())
     {

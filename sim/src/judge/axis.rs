@@ -7,6 +7,8 @@ pub const STANDSTILL_RPM: f64 = 5.0;
 /// A stop counts once the axis has stood this long; shorter ones belong to one
 /// movement (the last increments of a closed position loop).
 pub const SETTLED: Time = Time::from_ms(100);
+/// So long it has stood at least if it goes on after a rest.
+const PAUSE: Time = Time::from_ms(5);
 /// Distance of the points that are kept for pictures.
 const TRACE_STEP: Time = Time::from_ms(2);
 
@@ -63,6 +65,9 @@ pub struct AxisMonitor {
     last: Option<TracePoint>,
     unreleased: Option<Unreleased>,
     trace: Vec<TracePoint>,
+    /// A movement that went on after a rest which was too short to end it: when it had
+    /// stopped, and when it went on.
+    resumed: Option<(Time, Time)>,
 }
 
 impl AxisMonitor {
@@ -95,7 +100,12 @@ impl AxisMonitor {
             });
         }
         match self.movements.last_mut() {
-            Some(movement) if !movement.settled => movement.stopped = now.at,
+            Some(movement) if !movement.settled => {
+                if now.at > movement.stopped + PAUSE {
+                    self.resumed = Some((movement.stopped, now.at));
+                }
+                movement.stopped = now.at;
+            }
             _ => self.movements.push(Movement {
                 started: now.at,
                 stopped: now.at,
@@ -121,17 +131,26 @@ impl AxisMonitor {
         }
     }
 
-    /// What it does from now on is another movement, if it stands now, however shortly.
+    /// What it does from now on is another movement, if it stands now, however shortly. If
+    /// it has gone on for a moment only, that is no part of the movement: an axis which is to
+    /// change its mode is told to stay where it is, some increments beside its target.
     pub fn divide(&mut self) {
         let Some(now) = self.last else { return };
         let movement = self.movements.last_mut();
-        if let Some(movement) = movement.filter(|movement| !movement.settled)
-            && now.velocity.abs() <= STANDSTILL_RPM
-        {
-            movement.settled = true;
-            movement.rest_low = now.position;
-            movement.rest_high = now.position;
+        let Some(movement) = movement.filter(|movement| !movement.settled) else {
+            return;
+        };
+        let turns = now.velocity.abs() > STANDSTILL_RPM;
+        let shortly =
+            |(_, at): &(Time, Time)| *at > movement.started && movement.stopped.since(*at) < PAUSE;
+        match self.resumed.filter(shortly) {
+            Some((stopped, _)) => movement.stopped = stopped,
+            None if turns => return,
+            None => {}
         }
+        movement.settled = true;
+        movement.rest_low = now.position;
+        movement.rest_high = now.position;
     }
 
     /// Every movement so far.
@@ -211,6 +230,29 @@ mod tests {
         assert_eq!(axis.unreleased(), None);
         assert_eq!(axis.travelled(), 22.0);
         assert_eq!(axis.movements()[0].release, 1);
+    }
+
+    /// The last increments of another mode are no part of the movement before.
+    #[test]
+    fn what_begins_as_it_is_divided_is_another_movement() {
+        let mut axis = AxisMonitor::default();
+        let turn = |axis: &mut AxisMonitor, ms, velocity| {
+            axis.sample(at(ms, 1000.0, velocity), Some(1));
+        };
+        for (ms, velocity) in [(0, 100.0), (1, 50.0), (2, 0.0), (60, 0.0), (61, 9.0)] {
+            turn(&mut axis, ms, velocity);
+        }
+        axis.divide();
+        let ended = axis.movements()[0].clone();
+        assert_eq!((ended.stopped, ended.settled), (Time::from_ms(1), true));
+        turn(&mut axis, 62, 9.0);
+        assert_eq!(axis.movements().len(), 2);
+        // On its way nothing is divided.
+        for ms in 63..80 {
+            turn(&mut axis, ms, 9.0);
+        }
+        axis.divide();
+        assert!(!axis.at_rest());
     }
 
     #[test]

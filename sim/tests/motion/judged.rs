@@ -111,6 +111,27 @@ fn drives_on_their_way_during_other_steps_arrive() {
 }
 
 #[test]
+fn a_loop_that_comes_to_the_same_places_is_followed_to_its_end() {
+    for seed in 111..114 {
+        is_right("there_and_back", seed);
+    }
+}
+
+#[test]
+fn a_rest_between_two_modes_is_short() {
+    is_right("modes_at_once", 108);
+    is_right("modes_at_once", 109);
+}
+
+#[test]
+fn an_axis_that_does_not_arrive_before_another_mode_is_told() {
+    let should = "[[step.move]]\nto = 0\n";
+    let does = should.replace('0', "[0, 0, 0, 50, 0, 0]");
+    let reason = is_told("modes_at_once", 110, should, &does);
+    assert!(reason.contains("node 4: stopped"), "{reason}");
+}
+
+#[test]
 fn an_axis_that_does_not_arrive_after_a_torque_is_told() {
     let told = |should: &str, does: &str| is_told("torque_and_moves", 105, should, does);
     let by = told("by = [7000, 7000]", "by = [7100, 7000]");
