@@ -1,7 +1,7 @@
 //! What the group wants a drive to show before it goes on: a mode of operation, which is
 //! written to 6060h and read in 6061h, or the velocity of its next set-point, 6081h. An
-//! answer that stays away, or another value, is waited for as long as the group does,
-//! which then names the axis.
+//! answer that stays away, or another value, is waited for as long as the group or its
+//! director does, which then names the axis.
 
 use crate::{app::app::NETWORK, asking};
 use canmaster::{
@@ -71,11 +71,12 @@ impl Settings {
         }
         let wanted = wanted.filter(|_| now >= self.next)?;
         self.next = now + REPEAT;
-        let (at, mut command) = self.access(wanted.setting);
-        if self.written {
-            command = UPLOAD;
-        }
-        Some(asking::request(command, at, node(&wanted)?, wanted.value))
+        let (at, command) = self.access(wanted.setting);
+        let (command, value) = match self.written {
+            true => (UPLOAD, 0),
+            false => (command, wanted.value),
+        };
+        Some(asking::request(command, at, node(&wanted)?, value))
     }
 
     /// Takes in an answer; `false` if it is somebody else's.
@@ -86,10 +87,9 @@ impl Settings {
         let answers = |node| CobId::of(FunctionCode::SdoResponse, node) == frame.id();
         let [command, low, high, sub, value @ ..] = frame.padded();
         let (at, written) = self.access(wanted.setting);
-        if !node(wanted).is_some_and(answers)
-            || [low, high] != at.index.0.to_le_bytes()
-            || sub != at.sub.0
-        {
+        // All of them have sub-index 0.
+        let of = u32::from_le_bytes([low, high, sub, 0]);
+        if of != at.index.0.into() || !node(wanted).is_some_and(answers) {
             return false;
         }
         match command {

@@ -108,7 +108,7 @@ fn profile_position_by_handshake() {
             ..far(n)
         });
         let mut raised = false;
-        for _ in 0..30 {
+        for _ in 0..45 {
             rig.step(READY);
             raised |= rig.commands[0].controlword & 1 << 4 != 0;
         }
@@ -234,7 +234,7 @@ fn modes_side_by_side_are_judged_and_begin_together() {
 #[test]
 fn a_stopped_set_point_is_not_gone_on_with() {
     for order in [Order::Stop, Order::Halt] {
-        for moment in (2..24).chain([60]) {
+        for moment in (2..40).chain([60]) {
             let mut rig = Rig::in_mode(3, Mode::ProfilePosition);
             rig.released();
             rig.go(far);

@@ -4,7 +4,7 @@
 use canmaster::motion::experiment::GROUP;
 use canmaster::motion::mode::Mode;
 use canmaster::motion::{
-    AxisMove, DriveSetting, GroupEvent, GroupState, Order, Reason, Refusal, Wanted,
+    AxisMove, DriveSetting, GroupEvent, GroupState, Inputs, Order, Reason, Refusal, Wanted,
 };
 
 use crate::rig::{ALL, AXES, READY, Rig, far};
@@ -51,7 +51,7 @@ fn a_set_point_waits_for_its_velocity_and_ramps() {
     rig.confirms = false;
     rig.go(part);
     for n in 0..AXES {
-        for _ in 0..20 {
+        for _ in 0..30 {
             rig.step(READY);
             assert_eq!(begun(&rig), 0, "axis {n}");
         }
@@ -105,12 +105,51 @@ fn a_velocity_that_is_not_shown_refuses_the_move() {
     let why = Refusal::of(0, Reason::NotShown, part(0).velocity, 0);
     assert_eq!(rig.notices.last(), Some(&GroupEvent::MoveRefused(why)));
     assert_eq!(rig.group.state(), GroupState::Moving);
+    // It is asked for no more, and the others can go on without it.
+    assert_eq!(rig.group.wanted(), None);
+    let parts = core::array::from_fn(part);
+    assert_eq!(rig.director.go(&rig.group, 0b10, &parts, 0), Ok(()));
+    rig.step(READY);
+    rig.step(READY);
+    let second = velocity(1, part(1).velocity);
+    assert_eq!(rig.group.wanted(), Some(second));
+    rig.group.confirm(&second);
+    rig.arrive(2000);
     rig.confirms = true;
     rig.go(part);
     rig.arrive(2000);
     let home = rig.group.view(0).unwrap().home;
     let target = f64::from(home + part(0).target);
     assert!((rig.drives[0].position - target).abs() < 5.0);
+}
+
+/// An axis that is left out is told nothing, and keeps no move from the others.
+#[test]
+fn a_drive_that_is_absent_is_not_waited_for() {
+    let without = Inputs {
+        absent: 1 << 2,
+        ..READY
+    };
+    let mut rig = Rig::in_mode(3, Mode::ProfilePosition);
+    rig.silent[2] = true;
+    for _ in 0..200 {
+        rig.step(without);
+    }
+    assert_eq!(rig.group.state(), GroupState::Standby, "{}", rig.last());
+    rig.order(Order::Release);
+    for _ in 0..20 {
+        rig.step(without);
+    }
+    rig.go(part);
+    let moved = (0..2000).any(|_| {
+        rig.step(without);
+        rig.director.patience() == 0 && rig.group.all_arrived()
+    });
+    assert!(moved, "{}", rig.last());
+    for n in (0..AXES).filter(|n| *n != 2) {
+        let target = rig.group.view(n).unwrap().home + part(n).target;
+        assert!((rig.drives[n].position - f64::from(target)).abs() < 5.0);
+    }
 }
 
 /// What was being written when a stop came may have been taken or not: it is written

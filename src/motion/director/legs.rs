@@ -10,6 +10,9 @@ use crate::motion::{fixed, next, plan};
 
 /// Points of a path that are handed over in one look, since the group waits.
 const POINTS: usize = 2;
+/// Cycles until new ramps are in the drives, and two for each axis: RPDO2 goes to one in a
+/// cycle, where nothing of higher priority has its place.
+const SENT: u32 = 8;
 /// Cycles in which a drive shows the velocity of its next set-point.
 const PATIENCE: u32 = 1000;
 
@@ -98,6 +101,7 @@ impl<const N: usize> Director<N> {
     ) -> Result<bool, Refused> {
         let lead = LEAD + self.later;
         self.start = group.count().wrapping_add(lead);
+        let here = group.here();
         let mut ready = true;
         for (axis, leg) in self.legs.iter_mut().enumerate() {
             let Some(of) = group.axis_mut(axis) else {
@@ -115,7 +119,8 @@ impl<const N: usize> Director<N> {
                 }
             } else if mode == Mode::ProfilePosition {
                 if leg.set.take().is_some() {
-                    self.set_points |= 1 << axis;
+                    // One that is left out is told nothing.
+                    self.set_points |= here & 1 << axis;
                 }
                 if self.set_points >> axis & 1 == 0 {
                     continue;
@@ -128,7 +133,7 @@ impl<const N: usize> Director<N> {
                 // Its drive counts as people do.
                 let profile = [leg.velocity, leg.acceleration, leg.deceleration];
                 let profile = profile.map(|value| value as u32);
-                if !of.prepare(profile, N as u32) {
+                if !of.prepare(profile, SENT + 2 * N as u32) {
                     ready = false;
                     if self.start.wrapping_sub(self.until) as i32 >= 0 {
                         self.error.axis = axis as u8;

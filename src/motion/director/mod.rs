@@ -445,8 +445,9 @@ impl<const N: usize> Director<N> {
     /// After that: a program ends; a move that cannot be made leaves everything as
     /// it is.
     fn give_up(&mut self, group: &mut Group<N>) {
-        let mut error = self.error;
-        error.step = self.step();
+        group.forget_speeds();
+        self.error.step = self.step();
+        let error = self.error;
         let event = if self.running {
             // The group moves: a stop is never refused.
             let _ = group.order(Order::Stop);

@@ -326,8 +326,8 @@ impl Axis {
     }
 
     /// What its next set-point needs: velocity and ramps, rpm and rpm/s. Whether its drive
-    /// has it: RPDO2 goes to one of `axes` in a cycle, 6081h is asked for.
-    pub(in crate::motion) fn prepare(&mut self, [speed, up, down]: [u32; 3], axes: u32) -> bool {
+    /// has it: RPDO2 takes so many `cycles`, 6081h is asked for.
+    pub(in crate::motion) fn prepare(&mut self, [speed, up, down]: [u32; 3], cycles: u32) -> bool {
         if (self.up, self.down) != (up, down) {
             (self.up, self.down, self.ramped) = (up, down, self.count);
         }
@@ -337,7 +337,7 @@ impl Axis {
             self.speed = 0;
             return false;
         }
-        self.count.wrapping_sub(self.ramped) > axes
+        self.count.wrapping_sub(self.ramped) > cycles
     }
 
     /// Its drive shows this in 6081h.

@@ -176,7 +176,7 @@ impl<const N: usize> Group<N> {
     }
 
     /// All axes that are there.
-    const fn here(&self) -> Axes {
+    pub(super) const fn here(&self) -> Axes {
         (bit(N) - 1) & !self.absent
     }
 
@@ -365,6 +365,11 @@ impl<const N: usize> Group<N> {
             }
         }
         None
+    }
+
+    /// No drive is asked for a velocity any more.
+    pub(super) fn forget_speeds(&mut self) {
+        self.axes.iter_mut().for_each(Axis::forget_speed);
     }
 
     /// The drive of an axis shows what was wanted.
